@@ -106,7 +106,18 @@ class FusedModel:
         size_px: tuple[int, int],
         tile_px: int,
     ) -> Depth:
-        """Cast rays at some blocks (n, 3) for the depth of an image of a size, 0 for nothing."""
+        """Cast rays at blocks of the model to render a depth image.
+
+        Args:
+            blocks: Keys (n, 3) of the blocks.
+            matrix: Intrinsics (3, 3) of the image.
+            first_from_cam: Pose (4, 4).
+            size_px: Width and height of the image.
+            tile_px: Side of the tiles in which Open3D first finds the range of depth.
+
+        Returns:
+            Depth (h, w), metres; 0 where nothing is hit.
+        """
         shown: Depth = self._grid.ray_cast(
             blocks,
             o3d.core.Tensor.from_numpy(matrix),

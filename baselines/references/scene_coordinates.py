@@ -67,7 +67,10 @@ class _Coordinates(OutputLayer):
 
 
 class CoordinateNetwork(nn.Module):
-    """Points (B, 3, R, C) in metres, around a mean, of images (B, 3, h, w) at rest."""
+    """Network from normalised images (B, 3, h, w) to the points (B, 3, R, C) that their cells show.
+
+    Points are in metres, in the world of the labels; at first all are the mean of those to learn.
+    """
 
     mean_m: Tensor
 

@@ -65,7 +65,7 @@ class Muon(Untraced):
                 stack.step(ahead, group["lr"], group["weight_decay"])
 
     def _ahead(self, parameters: list[Tensor], momentum: float) -> Sequence[Tensor]:
-        """Update the momenta; where Nesterov's step of each parameter goes."""
+        """Update the momenta, and return Nesterov's step of each parameter."""
         gradients = [p.grad for p in parameters if p.grad is not None]
         buffers = [self._buffer(p) for p in parameters]
         torch._foreach_lerp_(buffers, gradients, 1 - momentum)

@@ -193,7 +193,7 @@ def _blocks(parts: Sequence[PosedFrames]) -> NDArray[np.int64]:
 
 
 def _scene_of(folder: Path) -> str:
-    """Name of the place that a data set shows."""
+    """Name the place that a data set shows."""
     manifest = folder / MANIFEST
     scene = read_json(manifest).get("scene") if manifest.is_file() else None
     name = scene.get("name") if isinstance(scene, dict) else None

@@ -51,7 +51,7 @@ class ResumeFile:
         self._saved = time.monotonic()
 
     def load(self, parts: Mapping[str, Restorable]) -> None:
-        """Give every part the state it had, if the file is about this training run."""
+        """Give every part the state it had, if the file is of this training run."""
         content = self._read()
         if content is None:
             return

@@ -78,8 +78,8 @@ def one_yardstick(run: pd.DataFrame) -> bool:
 def summary_of(table: pd.DataFrame) -> pd.DataFrame:
     """Count by measure how many runs are ``better``, ``worse`` or ``unseen`` by their intervals.
 
-    And how many are ``lower`` or ``higher``, by however little, with ``p_sign`` of a two-sided sign
-    test of these (1 without either); and ``percent``, the mean relative change.
+    Also count how many are ``lower`` or ``higher``, by however little, with ``p_sign`` of a
+    two-sided sign test of these (1 without either), and average ``percent``, the relative change.
     """
     rows = []
     for measure, found in table.groupby("measure", sort=False):

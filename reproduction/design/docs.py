@@ -78,7 +78,7 @@ Where they differ most (a dash is the default); their files have the rest.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write or check the two files; returns the exit status."""
+    """Write or check the two files; return the exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m reproduction.design.docs", description=main.__doc__
     )

@@ -54,7 +54,7 @@ def ranked_sets(design: Design) -> list[DataSet]:
 
 
 def _localizers(design: Design, key: DataSet) -> dict[str, list[str]]:
-    """Folders of the runs of all localizers that start pretrained; none without such runs."""
+    """List the runs' folders of all localizers that start pretrained; none without such runs."""
     rows = [row for row in design.rows if (row.scene, row.size, row.label_id) == key]
     runs = {model: design.runs_of(row.pretrained, model) for row in rows[:1] for model in MODELS}
     return {
@@ -65,7 +65,7 @@ def _localizers(design: Design, key: DataSet) -> dict[str, list[str]]:
 
 
 def _folders(design: Design, references: ReferencesConfig, key: DataSet) -> dict[str, list[str]]:
-    """Folders of all methods on a data set; none where no localizer is trained on it."""
+    """List the folders of all methods on a data set; none where no localizer is trained on it."""
     localizers = _localizers(design, key)
     if not localizers:
         return {}
@@ -74,5 +74,5 @@ def _folders(design: Design, references: ReferencesConfig, key: DataSet) -> dict
 
 
 def _in_all(sets: Sequence[dict[str, list[str]]]) -> list[str]:
-    """Names that all of the mappings have, in the order of the first."""
+    """List the names that all of the mappings have, in the order of the first."""
     return [name for name in (sets[0] if sets else {}) if all(name in one for one in sets)]

@@ -240,7 +240,7 @@ def _draw_panels(
     places: Callable[[pd.DataFrame], list[str]],
     published: bool,
 ) -> NDArray:  # type: ignore[type-arg]
-    """Draw measures down, parts of a table by title across, ``places`` below; the axes (2, N)."""
+    """Draw measures down, parts of a table by title across, ``places`` below: axes (2, N)."""
     panels = figure.subplots(2, len(parts), squeeze=False, sharey="row", sharex="col")
     for column, (title, rows) in zip(panels.T, parts.items(), strict=True):
         for axes, measure in zip(column, units, strict=True):

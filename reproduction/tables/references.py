@@ -132,7 +132,7 @@ def read_references(path: Path) -> pd.DataFrame:
 
 
 def _seconds(folder: Path) -> dict[str, float]:
-    """Processor seconds: of a whole query, and of what is learned or built from labels before."""
+    """Return processor seconds: of a query, and of what is learned or built from labels before."""
     needed = ("answer_s", "query_s", "prepare_s", "frames")
     facts = read_result(folder / "facts.json", needed, "answer again")
     seconds = facts["answer_s"] / facts["frames"] + facts["query_s"]

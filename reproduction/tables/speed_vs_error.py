@@ -204,7 +204,7 @@ def label_rows(root: Path, scene: str) -> pd.DataFrame:
 def effect_rows(root: Path, scene: str) -> pd.DataFrame:
     """Tabulate measured effects of camera and light; an item is a frame for the network.
 
-    Seconds are of the processor; an error is the median position error of the localizers trained on
+    Seconds are processor time; an error is the median position error of the localizers trained on
     ideal frames, the mean over the five. The tables of the paper use ideal frames.
     """
     measured = root / "scenes" / scene / "effects_speed.csv"

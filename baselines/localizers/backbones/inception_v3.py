@@ -111,7 +111,7 @@ class Mixed(nn.Module):
         self.n_out = sum(self._add(branch, n_in, width) for branch in self.branches)
 
     def _add(self, branch: Branch, n: int, width: float) -> int:
-        """Make a branch's convolutions; the number of channels it puts out."""
+        """Add the convolutions of a branch, and return the number of channels it puts out."""
         for step in branch.steps:
             n_out = [scaled_channels(conv.n_out, width) for conv in step]
             for conv, channels in zip(step, n_out, strict=True):
