@@ -34,9 +34,14 @@ class Loop:
         """Load the mesh and open a renderer."""
         width, height = options.samples * options.width, options.samples * options.height
         self._samples = options.samples
-        self._scene = pyrender.Scene.from_trimesh_scene(
-            trimesh.load(options.mesh, force="scene", process=False), bg_color=np.zeros(4)
-        )
+        loaded = trimesh.load(options.mesh, force="scene", process=False)
+        for mesh in loaded.geometry.values():
+            # trimesh drops the vertex colours of a mesh that has a material. Ours, without light,
+            # are another attribute of the same file.
+            if "_SRGB" in mesh.vertex_attributes:
+                colours = mesh.vertex_attributes["_SRGB"]
+                mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=colours)
+        self._scene = pyrender.Scene.from_trimesh_scene(loaded, bg_color=np.zeros(4))
         focal_px = 0.5 * width / np.tan(np.radians(0.5 * options.fov))
         self._camera = self._scene.add(
             pyrender.IntrinsicsCamera(

@@ -4,6 +4,7 @@ import math
 import os
 import pickle
 from pathlib import Path
+from zlib import crc32
 
 import numpy as np
 import pytest
@@ -55,17 +56,28 @@ def full(profile):
 
 
 def wrong_values(profile):
-    """Label, changed key, what it was changed to, and the whole mapping."""
+    """Label, changed key, what it was changed to, and the whole mapping.
+
+    Every change is tried on one profile: they hold nearly the same keys, and a label falls to the
+    same profile wherever it stands.
+    """
     raw = full(profile)
+
+    def is_tried(label):
+        return crc32(label.encode()) % len(PROFILES) == PROFILES.index(profile)
+
     for place in places(raw):
         name = ".".join(map(str, place))
         for value in VALUES:
-            yield f"{name} = {str(value)[:20]!r}", place, value, replaced(raw, place, value)
-        yield f"without {name}", place, None, removed(raw, place)
+            if is_tried(label := f"{name} = {str(value)[:20]!r}"):
+                yield label, place, value, replaced(raw, place, value)
+        if is_tried(label := f"without {name}"):
+            yield label, place, None, removed(raw, place)
         if isinstance(at(raw, place), dict):
             for key in ("surplus", "", "x" * 5000, "../x", 5, None):
-                inner = {**at(raw, place), key: next(iter(at(raw, place).values()), 1)}
-                yield f"{name} with {str(key)[:9]!r}", place, inner, replaced(raw, place, inner)
+                if is_tried(label := f"{name} with {str(key)[:9]!r}"):
+                    inner = {**at(raw, place), key: next(iter(at(raw, place).values()), 1)}
+                    yield label, place, inner, replaced(raw, place, inner)
 
 
 def is_config(config, place, value):
