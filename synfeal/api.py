@@ -282,7 +282,16 @@ def find_pairs(path: AnyPath, out: AnyPath, **settings: Any) -> pd.DataFrame:
 
 
 def validate(path: AnyPath, camera: AnyPath | None = None, every_pair: bool = False) -> list[str]:
-    """Check a data set and return one line for each failed check, with its first failure."""
+    """Check a data set, as ``synfeal validate`` does.
+
+    Args:
+        path: The data set.
+        camera: Calibration file, for a data set without a manifest or with another camera.
+        every_pair: Compare all pairs of frames, not a sample of a large set.
+
+    Returns:
+        One line for each failed check, with its first failure; none if nothing is wrong.
+    """
     from synfeal.validation.run import error_lines
     from synfeal.validation.run import validate as run_checks
 

@@ -38,10 +38,11 @@ class PhotographCamera:
 
     @classmethod
     def read(cls, file: Path | None, focal_px: float | None, exif: bool) -> PhotographCamera:
-        """Read the calibration file, if one is given.
+        """Read the calibration file, if one is given; see the attributes for the arguments.
 
         Raises:
-            InputError: It cannot be used, a focal length is given too, or that is no length.
+            InputError: The file cannot be used, both a file and a focal length are given, or the
+                focal length is not a positive number.
         """
         if file is not None and focal_px is not None:
             raise InputError("--focal: the calibration of --camera has one; give one of the two")

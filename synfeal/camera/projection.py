@@ -219,7 +219,17 @@ def cell_pixels(camera: Camera, columns: int, rows: int) -> Array:
 
 
 def cell_directions(camera: AnyCamera, columns: int, rows: int) -> Array:
-    """Return the points (rows, columns, 3) at depth 1 that the middles of equal cells show."""
+    """Return the points at depth 1 that the centres of equal cells of an image show.
+
+    Args:
+        camera: A camera of any model.
+        columns: Number of cells across the image.
+        rows: Number of cells down the image.
+
+    Returns:
+        Points (rows, columns, 3) in the frame of the camera, as :func:`rays_of_pixels` gives
+        them: NaN where the lens shows nothing.
+    """
     return rays_of_pixels(camera, cell_pixels(camera, columns, rows))
 
 

@@ -266,6 +266,15 @@ class DatasetConfig(Strict):
         return self.results / self.profile
 
     def n_frames(self, scene: str, size: str, split: str) -> int:
-        """Count the frames of a split at this profile's scale: at least 2, if there are as many."""
+        """Count the frames of a split at this profile's scale.
+
+        Args:
+            scene: Name of the scene.
+            size: Name of the size, such as ``6k``.
+            split: ``train`` or ``test``.
+
+        Returns:
+            The size's frames times ``scale``, rounded, but at least 2 if the size has as many.
+        """
         full: int = getattr(self.scenes[scene].sizes[size], split)
         return max(min(2, full), round(full * self.scale))

@@ -159,7 +159,18 @@ def _shortened(effects: EffectsConfig, collection: CollectionConfig) -> EffectsC
 
 
 def refuse_long_exposure(effects: EffectsConfig, collection: CollectionConfig, key: str) -> None:
-    """Refuse to expose for longer than there is between two frames; ``key`` holds the effects."""
+    """Refuse an exposure longer than the time between two frames.
+
+    Repeated poses (mode ``repeat``) always pass: ``frame_spacing_m`` is not theirs.
+
+    Args:
+        effects: Effects with the exposure of motion blur and the speed of the camera.
+        collection: Mode, and the distance between frames.
+        key: Key of the configuration that holds the effects, for messages.
+
+    Raises:
+        ValueError: The exposure is too long, or motion blur is asked of independent frames.
+    """
     blur = effects.motion_blur
     if blur is None or collection.mode == "repeat":
         return

@@ -156,10 +156,18 @@ class AutoExposure:
 
 
 def with_noise(light: Light, noise: NoiseConfig, rng: np.random.Generator) -> Light:
-    """Add shot and read noise: variance ``light / full_well + (read / full_well)^2``, clipped at 1.
+    """Add shot and read noise: variance ``light / full_well + (read / full_well)^2``.
 
     The normal approximation of the Poisson-Gaussian model (Foi et al., IEEE TIP 17(10), 2008), in
     which a well that is full holds no more.
+
+    Args:
+        light: Linear light (...), white at 1; clipped to 0 to 1 before noise is added.
+        noise: Electrons of a full well and of read noise.
+        rng: Source of the noise.
+
+    Returns:
+        Noisy light (...), which may lie outside 0 to 1.
     """
     signal = np.clip(light, 0, 1)
     variance = signal / np.float32(noise.full_well_e)

@@ -69,9 +69,17 @@ def moved_right(world_from_cam: ArrayLike, distance_m: float) -> Array:
 
 
 def interpolate(pose_a: ArrayLike, pose_b: ArrayLike, fraction: ArrayLike) -> Array:
-    """Interpolate poses (N, 4, 4) at fractions (N,) from a to b.
+    """Interpolate between two poses.
 
     Positions follow a straight line, rotations turn at constant angular velocity.
+
+    Args:
+        pose_a: Pose (4, 4) at fraction 0.
+        pose_b: Pose (4, 4) at fraction 1.
+        fraction: Fractions (N,), or a single one.
+
+    Returns:
+        Poses (N, 4, 4).
     """
     a, b = np.asarray(pose_a, dtype=np.float64), np.asarray(pose_b, dtype=np.float64)
     fraction = np.atleast_1d(np.asarray(fraction, dtype=np.float64))
@@ -95,14 +103,20 @@ def pose_error(pose_a: ArrayLike, pose_b: ArrayLike) -> tuple[Array, Array]:
 def umeyama_sim3(
     source: ArrayLike, target: ArrayLike, with_scale: bool = True
 ) -> tuple[float, Array, Array]:
-    """Fit scale, rotation (3, 3) and translation t (3,) that map source to target points.
+    """Fit the similarity ``target = scale * rotation @ source + t`` to pairs of points.
 
-    The model is ``target = scale * rotation @ source + t``.
-    Least squares over point pairs (N, 3), N >= 3 and not collinear (Umeyama, PAMI 1991, eq. 39-42).
-    Without ``with_scale`` the scale is 1.
+    Least squares (Umeyama, PAMI 1991, eq. 39-42).
+
+    Args:
+        source: Points (N, 3), at least three and not collinear.
+        target: The same points (N, 3), row by row, in the frame to map to.
+        with_scale: Fit the scale too; otherwise it is 1.
+
+    Returns:
+        Scale, rotation (3, 3) and translation t (3,).
 
     Raises:
-        ValueError: fewer than three pairs, or points of either set that are collinear up to
+        ValueError: Fewer than three pairs, or points of either set that are collinear up to
             rounding (their rotation about the line is free).
     """
     source, target = np.asarray(source, np.float64), np.asarray(target, np.float64)

@@ -68,11 +68,19 @@ class SeenSurface(NamedTuple):
 def seen_surface(
     mesh: Triangles, caster: RayCaster, hubs_m: Array, plan: PoseTable, camera: CameraConfig
 ) -> SeenSurface:
-    """Look at ``N_POINTS`` points, uniform over the surface, from up to ``MAX_FRAMES`` frames.
+    """Count the points of a mesh's surface that can be seen, and those that a plan's frames see.
 
-    A point is in a frame if it is projected into the image, no farther than ``FARTHEST_M``, and
-    nothing is in front of it. From either side: scans have holes, and walls without thickness. What
-    none of the places ``hubs_m`` (H, 3) in the free space sees cannot be seen.
+    ``N_POINTS`` points are drawn uniformly over the surface. A point is in a frame if it is
+    projected into the image, no farther than ``FARTHEST_M``, and nothing is in front of it. Either
+    side of a surface counts: scans have holes, and walls without thickness.
+
+    Args:
+        mesh: The mesh.
+        caster: Rays against it.
+        hubs_m: Places (H, 3) in the free space, world, metres. A point that none of them sees
+            cannot be seen.
+        plan: Poses of the frames; at most ``MAX_FRAMES`` are looked at, spread evenly.
+        camera: Camera of the frames.
     """
     surface = trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False)
     points, _ = trimesh.sample.sample_surface(surface, N_POINTS, seed=0)
@@ -108,7 +116,7 @@ def has_line(caster: RayCaster, place_m: Array, points_m: Array) -> NDArray[np.b
 
 
 def in_image(camera: CameraConfig, world_from_cam: Array, points_m: Array) -> NDArray[np.bool_]:
-    """Mark points (N, 3) that a pose (4, 4) projects into the image, within reach: (N,)."""
+    """Mark points (N, 3) within ``FARTHEST_M`` that a pose (4, 4) projects into the image: (N,)."""
     offset = points_m - world_from_cam[:3, 3]
     at = offset @ world_from_cam[:3, :3]
     reached = np.einsum("ni,ni->n", at, at) <= FARTHEST_M**2
@@ -127,10 +135,15 @@ class EmptyPixels:
 
 
 def empty_pixels(caster: RayCaster, plan: PoseTable, camera: CameraConfig) -> EmptyPixels:
-    """Cast a grid of rays through up to 1,000 frames, spread evenly over a plan of at least one.
+    """Measure how much of a plan's frames shows nothing, by a grid of rays through each.
 
     A pixel is empty where nothing is between the near and the far plane. What an alpha test cuts
     out counts as solid.
+
+    Args:
+        caster: Rays against the mesh.
+        plan: Poses of at least one frame; at most ``MAX_FRAMES`` are looked at, spread evenly.
+        camera: Camera of the frames, with its near and far plane.
     """
     shares = empty_shares(caster, plan.world_from_cam[shown_frames(len(plan))], camera)
     return EmptyPixels(
@@ -141,7 +154,7 @@ def empty_pixels(caster: RayCaster, plan: PoseTable, camera: CameraConfig) -> Em
 
 
 def empty_shares(caster: RayCaster, world_from_cam: Array, camera: CameraConfig) -> Array:
-    """Render the share (N,) of pixels that show nothing from each of the poses (N, 4, 4)."""
+    """Measure the share (N,) of the image that shows nothing from each of the poses (N, 4, 4)."""
     ray = cell_directions(camera, COLUMNS, ROWS).reshape(-1, 3)  # at depth 1
     n_rays = len(ray)
     ray = ray[np.isfinite(ray).all(axis=1)]  # a fisheye may show nothing in its corners
@@ -209,9 +222,17 @@ def scene_coverage(
 def free_space_coverage(
     space: ConnectedSpace, boxes_m: Array, plan: PoseTable
 ) -> dict[str, float | None]:
-    """Mark voxels of the connected space in the boxes (B, 2, 3) that have cameras near them.
+    """Measure how much of the free space, and of the headings in it, a plan's cameras cover.
 
-    See ``DEFINITIONS``.
+    Args:
+        space: The free space.
+        boxes_m: Lower and upper corners (B, 2, 3) of the sampling boxes, world, metres; (2, 3) for
+            one.
+        plan: Poses of the cameras.
+
+    Returns:
+        What ``coverage.json`` holds under ``free_space``, see ``DEFINITIONS``; shares are None
+        where no voxel is free.
     """
     cells = [voxel_centres(box_m) for box_m in np.reshape(boxes_m, (-1, 2, 3))]
     centres, edge_m = np.concatenate([found for found, _ in cells]), max(edge for _, edge in cells)
@@ -262,5 +283,5 @@ def headings(plan: PoseTable) -> NDArray[np.int64]:
 def write_coverage(
     collision: Path, scene: SceneConfig, plan: Path, camera: CameraConfig, out_coverage: Path
 ) -> None:
-    """Write what a plan covers as JSON."""
+    """Write what a plan covers as JSON; see :func:`plan_coverage`."""
     write_json(out_coverage, scene_coverage(collision, scene, read_pose_table(plan), camera))

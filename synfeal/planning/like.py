@@ -146,10 +146,17 @@ def _camera(mesh: Path, sequence: Path, record: dict[str, Any] | None) -> Camera
 
 
 def resized(camera: CameraConfig, width: int | None, height: int | None) -> CameraConfig:
-    """Resize the images of a lens; a side that is None follows from the other.
+    """Resize the images of a perspective camera, keeping its lens.
+
+    Args:
+        camera: The camera.
+        width: Width of the images, pixels; None to keep the aspect ratio.
+        height: Height of the images, pixels; None to keep the aspect ratio. If both are None, the
+            size stays.
 
     Raises:
-        InputError: The two sides would not keep the aspect ratio.
+        InputError: The two sides would not keep the aspect ratio, or the camera is a fisheye or a
+            panorama.
     """
     if camera.projection is not None:
         raise InputError(

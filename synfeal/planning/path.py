@@ -25,23 +25,31 @@ Array = NDArray[np.float64]
 
 
 def n_frames_of(start: Array, target: Array, frame_spacing_m: float) -> int:
-    """Count frames between two pose vectors (6,): distance over spacing, a whole number >= 1."""
+    """Count frames between two pose vectors (6,): distance over spacing, rounded, at least 1."""
     distance = float(np.linalg.norm(target[:3] - start[:3]))
     return max(1, round(distance / frame_spacing_m))
 
 
 def step_of(start: Array, target: Array, n_frames: int) -> Array:
-    """Change of every element (6,) per frame; each angle turns the short way round."""
+    """Return the change of every element (6,) per frame; each angle turns the short way round."""
     change = target - start
     change[3:] = (change[3:] + np.pi) % (2.0 * np.pi) - np.pi
     return change / n_frames
 
 
 def path_vectors(start: Array, target: Array, n_frames: int) -> PoseVectors:
-    """Return the pose vectors (n, 6) of frames 1 to n: ``v_j = v_i + j * step``.
+    """Return the pose vectors of frames 1 to n: ``v_j = v_i + j * step``.
 
     Erratum: the paper prints ``v_j = v_(j-1) + j * step``, which grows quadratically and overshoots
     the target; the movement it describes is this linear one.
+
+    Args:
+        start: Pose vector (6,) of the path's start, which is no frame of it.
+        target: Pose vector (6,) of frame n, its angles up to whole turns.
+        n_frames: Number n of frames.
+
+    Returns:
+        Pose vectors (n, 6).
     """
     frame = np.arange(1, n_frames + 1)[:, None]
     return start + frame * step_of(start, target, n_frames)
@@ -92,10 +100,16 @@ class CandidateStream:
     def next_target(
         self, start: NDArray[np.float64], min_path_m: float, max_rounds: int
     ) -> NDArray[np.float64] | None:
-        """Draw the target (6,) of a path from ``start`` (6,): the farthest of the first fit round.
+        """Draw the target of a path: the farthest candidate of the first round that has one.
 
-        None if none of the next ``max_rounds`` rounds has an admissible candidate that is
-        ``min_path_m`` away.
+        Args:
+            start: Pose vector (6,) that the path starts from.
+            min_path_m: Least length of the path, metres.
+            max_rounds: Rounds to try.
+
+        Returns:
+            The pose vector (6,); None if none of the rounds has an admissible candidate that far
+            away.
         """
         tried, window = 0, max(1, FIRST_WINDOW // self._candidates)
         while tried < max_rounds:
@@ -138,11 +152,19 @@ class CandidateStream:
 
 
 def independent_poses(space: PoseSpace, collection: CollectionConfig, n_frames: int) -> PoseVectors:
-    """Draw pose vectors (n_frames, 6), uniform where a view is free in the connected space.
+    """Draw poses uniformly from those with a free view in the connected space.
 
     Every admissible candidate is kept, so a round of candidates gives as many frames as it has
     admissible ones, and ``candidates`` does not change what is drawn. A shorter plan is a prefix
     of a longer one.
+
+    Args:
+        space: Where poses are sampled.
+        collection: ``max_tries`` and ``candidates``, which say when to give up.
+        n_frames: Number of poses.
+
+    Returns:
+        Pose vectors (n_frames, 6).
 
     Raises:
         InputError: ``max_tries`` rounds of ``candidates`` in a row had no admissible pose.

@@ -65,7 +65,7 @@ def plan_mesh(
     rng: np.random.Generator,
     split: str,
 ) -> PoseTable:
-    """Plan one split in a mesh called ``name``; see :func:`plan_split`."""
+    """Plan one split in a collision mesh, called ``name`` in messages; see :func:`plan_split`."""
     caster = RayCaster(*mesh)
     boxes = sampling_boxes_of(scene, caster.bounds_m, name)
     clearance = Clearance(*mesh, scene.min_clearance_m) if scene.min_clearance_m > 0 else None
@@ -73,7 +73,17 @@ def plan_mesh(
 
 
 def sampling_boxes_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Array:
-    """Return the configured sampling boxes (B, 2, 3), or the mesh's bounds as in the paper."""
+    """Return the boxes that camera centres are sampled in.
+
+    Args:
+        scene: Settings of the scene, with the boxes if any are configured.
+        mesh_bounds_m: Lower and upper corner (2, 3) of the mesh, world, metres: the box where none
+            is configured, as in the paper.
+        name: What messages call the mesh.
+
+    Returns:
+        Lower and upper corners (B, 2, 3), world, metres.
+    """
     if scene.sampling_box is None:
         return mesh_bounds_m[None]
     boxes = np.stack([box_array(box) for box in (scene.sampling_box, *scene.further_boxes)])

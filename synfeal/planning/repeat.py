@@ -26,9 +26,18 @@ log = logging.getLogger("synfeal")
 def repeated_poses(
     source: Path, split: str, n_frames: int, mesh_bounds_m: NDArray[np.float64]
 ) -> PoseTable:
-    """Read the first ``n_frames`` poses of ``source``, which must have as many.
+    """Read the first poses of a split of an earlier data set.
 
-    Logs a warning if some lie outside the mesh's bounds (2, 3).
+    Logs a warning if some lie outside the mesh.
+
+    Args:
+        source: Whatever :func:`read_poses` reads.
+        split: ``train`` or ``test``.
+        n_frames: Number of poses.
+        mesh_bounds_m: Lower and upper corner (2, 3) of the mesh, world, metres.
+
+    Raises:
+        InputError: The source has fewer poses.
     """
     table = read_poses(source, split)
     if len(table) < n_frames:

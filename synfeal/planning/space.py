@@ -34,7 +34,13 @@ def pose_bounds(box_m: Array, angles: Angles) -> Array:
 
 
 def sample_poses(bounds: Array, count: int, rng: np.random.Generator) -> PoseVectors:
-    """Draw pose vectors (count, 6), every element uniform and independent (Eq. 1)."""
+    """Draw pose vectors (count, 6), every element uniform and independent (Eq. 1).
+
+    Args:
+        bounds: Least and greatest value (2, 6) of each element, metres and radians.
+        count: Number of poses.
+        rng: Source of the numbers.
+    """
     return rng.uniform(bounds[0], bounds[1], (count, 6))
 
 
@@ -51,11 +57,19 @@ def view_directions(poses: PoseVectors) -> Array:
 def has_free_view(
     caster: RayCaster, poses: PoseVectors, min_view_distance_m: float
 ) -> NDArray[np.bool_]:
-    """Mark poses (N, 6) that look at a surface, but at none too near: (N,).
+    """Mark poses that look at a surface, but at none too near.
 
     Clarification of the paper: a view ray that hits nothing has an infinite length and would pass
     ``R > d``. It looks out through a hole of the mesh, at an image without information, which is
     what the criterion is there to prevent; so a hit is required.
+
+    Args:
+        caster: Rays against the mesh.
+        poses: Pose vectors (N, 6).
+        min_view_distance_m: Distance along the optical axis that the surface must be farther than.
+
+    Returns:
+        Marks (N,).
     """
     distance = caster.first_hit_m(poses[:, :3], view_directions(poses))
     return np.asarray((distance > min_view_distance_m) & np.isfinite(distance), dtype=np.bool_)
@@ -116,10 +130,9 @@ def farthest_admissible(
     min_path_m: float,
     is_clear_way: Callable[[Array], bool] | None = None,
 ) -> tuple[int, int] | None:
-    """Index of the first round with an admissible candidate, and there of the farthest.
+    """Find the first round with an admissible candidate, and the farthest one in it.
 
-    None if no round has an admissible candidate at least ``min_path_m`` from ``start`` (6,). The
-    least length is the published collector's: a path of a few centimetres adds no new view.
+    The least length is the published collector's: a path of a few centimetres adds no new view.
 
     Args:
         caster: Rays against the collision mesh.
@@ -129,6 +142,10 @@ def farthest_admissible(
         min_path_m: Least length of a path, metres.
         is_clear_way: Tells whether the way from the start to a target (6,) is wide enough; None if
             every way is.
+
+    Returns:
+        Indices of the round and of the candidate in it; None if no round has an admissible
+        candidate at least ``min_path_m`` away.
     """
     length_m = np.linalg.norm(rounds[..., :3] - start[:3], axis=-1)
     fit = has_view & (length_m >= min_path_m)
@@ -163,7 +180,7 @@ class PoseSpace:
         rng: np.random.Generator,
         clearance: Clearance | None = None,
     ) -> Self:
-        """Build the space of a box (2, 3) with the angles and the view distance of a scene."""
+        """Build the space of a box (2, 3) with a scene's angles, view distance and ``min_seen``."""
         bounds = pose_bounds(box_m, scene.angles)
         return cls(
             caster=caster,
@@ -209,10 +226,18 @@ def sample_start(space: PoseSpace, max_tries: int) -> Array:
 
 
 def largest_group(space: PoseSpace, max_tries: int, n_poses: int) -> PoseVectors:
-    """Find the largest group (M, 6) among ``n_poses`` sampled poses with a free view.
+    """Find the largest group of sampled poses that see each other, directly or through others.
 
-    Those that see each other are joined. Samples are uniform in volume, so the group is in the
-    largest space connected by free lines.
+    Samples are uniform in volume, so the group is in the largest space connected by free lines.
+
+    Args:
+        space: Where poses are sampled.
+        max_tries: Rounds of ``n_poses`` samples, at most.
+        n_poses: Poses with a free view that are looked for; once there are as many, no further
+            round is drawn.
+
+    Returns:
+        Pose vectors (M, 6) of the group.
 
     Raises:
         InputError: ``max_tries`` rounds gave no pose with a free view; says what to relax.
@@ -300,7 +325,7 @@ def draw_questions(
     rng: np.random.Generator,
     count: int = N_QUESTIONS,
 ) -> Questions:
-    """Draw questions planners of a scene would ask: the last candidates of ``count`` short walks.
+    """Draw the questions that a scene's planner would ask: the last candidates of short walks.
 
     Each walk leaves the planner's first pose and goes to every admissible candidate it draws, so a
     start is always an admissible pose: no question starts in a cupboard or outside the room.
@@ -310,7 +335,7 @@ def draw_questions(
         scene: Angle bounds and least view distance.
         box_m: Lower and upper corner (2, 3) of the space that is sampled, world, metres.
         rng: The only source of randomness.
-        count: Number of questions, which are independent but for the first pose.
+        count: Number of walks and of questions, which are independent but for the first pose.
     """
     space = PoseSpace.of_scene(caster, box_m, scene, rng)
     starts = np.tile(sample_start(space, MAX_TRIES), (count, 1))
