@@ -97,7 +97,17 @@ def collision_mesh(
 
 
 def search(full: Triangles, questions: Questions, min_agreement: float) -> list[Trial]:
-    """Measure meshes from ``full`` down to the smallest, and mark the one that is chosen."""
+    """Search for the smallest mesh on which decisions agree with those on the full mesh.
+
+    Args:
+        full: The full mesh.
+        questions: Questions that every mesh answers.
+        min_agreement: Least share of answers, 0 to 1, that must equal those on the full mesh.
+
+    Returns:
+        All meshes that were measured, from the full one to the smallest; ``chosen`` is 1 in the
+        rung of the smallest that agrees, as all larger ones do.
+    """
     reference = RayCaster(*full)
     trials = [measure(full, reference, questions, 0.0)]
     for n_faces in ladder(len(full.faces)):
@@ -125,7 +135,7 @@ def ladder(n_faces: int) -> list[int]:
 
 
 def last_agreeing(rungs: Sequence[Rung], min_agreement: float) -> int:
-    """Index of the smallest mesh such that it and all larger ones agree; the first always does."""
+    """Return the index of the smallest mesh that agrees, as all larger ones do; 0 always does."""
     agree = [rung.agreement >= min_agreement for rung in rungs]
     return agree.index(False) - 1 if False in agree else len(rungs) - 1
 

@@ -140,6 +140,14 @@ def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
     """Build the stand-in named by the scene's ``builder``, or load the file at its ``path``.
 
     Textures that lie beside the file are not part of its hash.
+
+    Args:
+        scene: Settings of the scene.
+        seed: Seed of a procedural scene whose settings name none; unused for files.
+        name: Name of the scene in the configuration, for messages.
+
+    Raises:
+        InputError: The file's SHA-256 is not the one that the settings give.
     """
     if scene.source == "procedural":
         return build_scene(str(scene.builder), seed if scene.seed is None else scene.seed)

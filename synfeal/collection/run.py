@@ -55,7 +55,14 @@ log = logging.getLogger("synfeal")
 def refuse_invisible(
     mesh: TexturedMesh, camera: CameraConfig, name: str, shade: Shade | None = None
 ) -> None:
-    """Check that the mesh shows something and reaches beyond the near plane of a camera in it."""
+    """Refuse a mesh of one colour, or one so small that a camera's near plane hides all of it.
+
+    Args:
+        mesh: The mesh.
+        camera: Camera of the frames.
+        name: What messages call the mesh.
+        shade: Light that shows its shape; a mesh of one colour is refused only without.
+    """
     if shade is None and shows_one_colour(mesh):
         raise InputError(
             f"{name}: is of one colour, and so would be every image; put its texture files (of an"

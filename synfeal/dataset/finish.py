@@ -146,7 +146,14 @@ def origin_of(config: DatasetConfig, scene: str) -> dict[str, Any]:
 def write_manifest(
     directory: Path, sequences: Sequence[Shard], camera: CameraConfig, extra: Mapping[str, Any]
 ) -> None:
-    """Write ``manifest.json``: camera, frame counts, hash of each sequence, versions, ``extra``."""
+    """Write ``manifest.json``: camera, frame counts, hash of each sequence, versions.
+
+    Args:
+        directory: Data set with all of its sequences.
+        sequences: The sequences, in the order to list them.
+        camera: Camera of the frames.
+        extra: Further entries, which replace those of the same name.
+    """
     record = camera.record
     if camera.fx is not None:  # which replaced the field of view
         del record["horizontal_fov_deg"]

@@ -278,8 +278,13 @@ def opened_image(
 ) -> Iterator[Image.Image]:
     """Open an image without decoding it.
 
+    Args:
+        content: The file's bytes.
+        formats: Names of the formats that Pillow tries, such as ``PNG``; None tries all.
+        most_pixels: Largest width times height.
+
     Raises:
-        ValueError: It claims more pixels than a frame may have; memory for them is not taken.
+        ValueError: The image claims more pixels; no memory is taken for them.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our bound is lower

@@ -92,9 +92,13 @@ class PoseTable:
 
 
 def write_pose_table(path: Path, table: PoseTable, images: Sequence[str] = ()) -> None:
-    """Write the table with enough digits to read back the same float64 values.
+    """Write a table with enough digits to read back the same float64 values.
 
-    ``images`` are names of the frames' images, if they are files.
+    Args:
+        path: File to write.
+        table: Poses; a column ``registered`` is written if the table has one.
+        images: Path of each frame's image below the data set, for a column ``image``; empty if the
+            frames are not files.
     """
     arrays = [table.frame, table.path, *table.position_m.T, *table.quat_wxyz.T]
     header = HEADER
@@ -182,7 +186,16 @@ def check_places(
 
 
 def check_unit(quat_wxyz: NDArray[np.float64], path: Path, line_of: NDArray[np.int64]) -> None:
-    """Refuse quaternions (N, 4) that are not of unit length; files of others hold few digits."""
+    """Refuse quaternions that are not of unit length, but for rounding to few digits.
+
+    Args:
+        quat_wxyz: Quaternions (N, 4), in any order.
+        path: File they were read from, for messages.
+        line_of: Line (N,) of the file that each stands on.
+
+    Raises:
+        InputError: A length is off by more than ``UNIT_TOLERANCE``.
+    """
     with np.errstate(over="ignore"):
         length = np.linalg.norm(quat_wxyz, axis=1)
     off = np.abs(length - 1.0) > UNIT_TOLERANCE
@@ -195,5 +208,5 @@ def check_unit(quat_wxyz: NDArray[np.float64], path: Path, line_of: NDArray[np.i
 
 
 def write_first_frames(plan: Path, n_frames: int, out_labels: Path) -> None:
-    """Write the first frames of a pose table as one of their own."""
+    """Write the first frames of a pose table as a pose table of their own."""
     write_pose_table(out_labels, read_frames(plan, 0, n_frames))

@@ -43,7 +43,16 @@ class Studio:
     def carry_out(
         self, renderer: SceneRenderer, task: Task, on_frame: Callable[[], object]
     ) -> float:
-        """Render a sequence; seconds it took."""
+        """Render a sequence.
+
+        Args:
+            renderer: What :meth:`open` returned.
+            task: Directory or archive to write, and the poses of its frames.
+            on_frame: Called after each frame.
+
+        Returns:
+            The seconds it took.
+        """
         began, (out, poses) = time.perf_counter(), task
         write_sequence(
             renderer,
@@ -58,7 +67,15 @@ class Studio:
 
 
 def render_sequences(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
-    """Render all sequences; each appears when it is whole."""
+    """Render all sequences; each appears when it is complete.
+
+    Args:
+        studio: What renders them.
+        tasks: Directory or archive to write, and the poses of its frames, for each sequence.
+        workers: Number of processes, of which no more are started than there are sequences; with
+            1, this process renders.
+        progress: Advanced by every frame.
+    """
     workers = min(workers, len(tasks))
     if workers > 1:
         _render_parallel(studio, tasks, workers, progress)

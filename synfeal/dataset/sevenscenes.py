@@ -172,7 +172,11 @@ class Sequence:
 
 
 def sequences_of(n_train: int, n_test: int, shard_frames: int) -> list[Sequence]:
-    """Divide frames into sequences of at most ``shard_frames``, first train's, then test's."""
+    """Divide frames into sequences of at most ``shard_frames``, first train's, then test's.
+
+    Raises:
+        ValueError: A number of frames is negative, or ``shard_frames`` is below 1.
+    """
     if shard_frames < 1 or min(n_train, n_test) < 0:
         raise ValueError(f"cannot divide {n_train} + {n_test} frames by {shard_frames}")
     sequences: list[Sequence] = []

@@ -69,7 +69,13 @@ class Frame(NamedTuple):
     def with_surface(
         self, layers: Layers, renderer: SceneRenderer, world_from_cam: NDArray[np.float64]
     ) -> Frame:
-        """Add the layers of the surface that are asked for; it is looked at only if any is."""
+        """Add the layers that show the surface; it is rendered only if one of them is asked for.
+
+        Args:
+            layers: Which of normals and masks to add.
+            renderer: Renderer of the scene.
+            world_from_cam: Pose (4, 4) of the frame.
+        """
         if not layers.of_surface:
             return self
         seen = renderer.surface(world_from_cam)
@@ -100,7 +106,11 @@ class Poses(Protocol):
 
 
 def path_effects(config: EffectsConfig, poses: Poses, first: int) -> EffectsConfig:
-    """Return the effects on the path that begins at row ``first``."""
+    """Draw which effects act on the path that begins at row ``first``; those that do not are None.
+
+    Each acts with the probability ``config.share``. The draw depends only on the configured seed
+    and on the number and place of the path's first frame.
+    """
     rng = _generator("path", config, poses, first)
     acts = dict(zip(EFFECTS, rng.random(len(EFFECTS)) < config.share, strict=True))
     return config.model_copy(update={name: None for name in EFFECTS if not acts[name]})
@@ -253,7 +263,7 @@ class _Path:
 
 
 def effects_table(config: EffectsConfig, poses: Poses) -> pd.DataFrame:
-    """Tabulate the effects and the light of each path; one row a path."""
+    """Tabulate the effects and the light of each path, one row per path."""
     import pandas as pd  # takes time to load
 
     rows = []
@@ -269,9 +279,16 @@ def effects_table(config: EffectsConfig, poses: Poses) -> pd.DataFrame:
 
 
 def objects_table(config: EffectsConfig, poses: Poses, crowd: Crowd) -> pd.DataFrame:
-    """Tell what stands along each path and where, one row an object.
+    """Tabulate the objects that stand along each path, one row per object.
 
-    Its columns ``id`` are the values of masks along the path.
+    Args:
+        config: Effects, which decide along which paths there are objects.
+        poses: Poses of whole paths.
+        crowd: The scene and the objects.
+
+    Returns:
+        Columns ``path``, ``id`` (the object's value in masks along the path), ``name``, those of
+        :data:`PLACE`, and ``yaw_deg``; no rows where there are no objects.
     """
     import pandas as pd
 

@@ -29,17 +29,34 @@ FEWEST_PATHS = 10
 
 
 def path_counts(n_paths: int, rng: np.random.Generator, resamples: int = RESAMPLES) -> Counts:
-    """Count each path's draws (1 + resamples, n_paths): once in the first row, then resampled."""
+    """Draw as many paths as there are, with replacement, and count how often each is drawn.
+
+    Args:
+        n_paths: Number of paths.
+        rng: Source of the draws.
+        resamples: Number of draws of ``n_paths`` paths.
+
+    Returns:
+        Counts (1 + resamples, n_paths). The first row takes each path once, which gives the
+        observed value.
+    """
     drawn = rng.multinomial(n_paths, np.full(n_paths, 1 / n_paths), size=resamples)
     return np.concatenate([np.ones((1, n_paths), dtype=np.int64), drawn])
 
 
 def medians(errors: Array, path: Counts, counts: Counts) -> Array:
-    """Compute medians (B,) of errors (N,) for each resample of their paths.
+    """Compute the median error in each resample of the paths.
 
-    ``path`` (N,) is the place of each frame's path in a row of ``counts`` (B, P), how often each
-    path is taken. An even number of frames gives the mean of the middle two. An infinite error is a
-    failure and counts as the worst; so does one that is not a number.
+    An even number of frames gives the mean of the middle two. An infinite error is a failure and
+    counts as the worst; so does one that is not a number.
+
+    Args:
+        errors: Error (N,) of each frame.
+        path: Column (N,) of ``counts`` that belongs to each frame's path.
+        counts: How often each resample takes each path (B, P), see :func:`path_counts`.
+
+    Returns:
+        Medians (B,).
     """
     errors = np.where(np.isnan(errors), np.inf, errors)
     order = np.argsort(errors)

@@ -277,7 +277,17 @@ def read_euroc(path: Path, text: str, told: bool = True) -> Estimates:
 def read_lines(
     path: Path, rows: Sequence[tuple[int, list[str]]], file_format: FormatName | None = None
 ) -> Estimates:
-    """Read lines of text, whose format follows from their count of numbers and a leading name."""
+    """Read poses from lines of text.
+
+    Args:
+        path: File the lines are from, for messages.
+        rows: Number of each line, and its columns; at least one line.
+        file_format: Format of the lines; None to tell it from the first line, by how many numbers
+            it has and whether a name leads them.
+
+    Raises:
+        InputError: Lines differ in their number of columns, or a cell is no number.
+    """
     line_format = _line_format(path, rows[0], file_format)
     columns = line_format.n_numbers + (line_format.frame_key == "name")
     for line, row in rows:

@@ -90,7 +90,16 @@ def is_pose(predicted: PoseTable) -> NDArray[np.bool_]:
 
 
 def within(errors: Mapping[str, Array], bound: Bound, end: str = "") -> NDArray[np.bool_]:
-    """Mark frames (N,) that are localized within a bound."""
+    """Mark the frames that are localized within a bound: both errors are below it.
+
+    Args:
+        errors: Errors (N,) by name.
+        bound: The bound.
+        end: Ending of the names, which says what the errors are against, such as ``_true``.
+
+    Returns:
+        Marks (N,).
+    """
     position, orientation = errors[POSITION + end], errors[ORIENTATION + end]
     return np.asarray((position < bound.position_m) & (orientation < bound.orientation_deg))
 
@@ -133,14 +142,23 @@ def with_limits(samples: Mapping[str, Array]) -> Metrics:
 
 
 def draws(path: NDArray[np.int64]) -> tuple[NDArray[np.intp], Counts]:
-    """Place of each frame's path (N,), and how often each draw takes each path."""
+    """Return the column (N,) of each frame's path, and how often each resample takes each path."""
     _, place = np.unique(path, return_inverse=True)
     n_paths = int(place.max()) + 1
     return place, path_counts(n_paths, generator_of("bootstrap", len(path)), RESAMPLES)
 
 
 def means(values: Array, place: NDArray[np.intp], counts: Counts) -> Array:
-    """Average values (N,) in each resample of their paths: (B,), infinite as soon as one is."""
+    """Average values in each resample of the paths.
+
+    Args:
+        values: Value (N,) of each frame.
+        place: Column (N,) of ``counts`` that belongs to each frame's path.
+        counts: How often each resample takes each path (B, P).
+
+    Returns:
+        Means (B,); infinite where a value that is taken is not finite.
+    """
     n_paths = counts.shape[1]
     lost = np.bincount(place, ~np.isfinite(values), n_paths)
     total = np.bincount(place, np.where(np.isfinite(values), values, 0.0), n_paths)

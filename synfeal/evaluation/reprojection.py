@@ -90,9 +90,15 @@ def dcre(predicted: PoseTable, reference: PoseTable, depth_m: Array, camera: Cam
 
 
 def dcre_summary(errors: Array, path: NDArray[np.int64], end: str = "") -> Metrics:
-    """Compute the median of DCREs (N,) and the shares below :data:`DCRE_BOUNDS`, with limits.
+    """Compute the median of DCREs and the shares below :data:`DCRE_BOUNDS`, with limits.
 
-    Frames that show nothing are left out. Names end in ``end``; ``path`` (N,) is what is drawn.
+    Args:
+        errors: DCRE (N,) of each frame; NaN where a frame shows nothing, which is left out.
+        path: Index (N,) of each frame's path: the bootstrap draws whole paths.
+        end: Ending of the names in the result, which says what the errors are against.
+
+    Returns:
+        Metrics such as ``dcre``, ``dcre_low`` and ``dcre_high``; none if no frame shows anything.
     """
     seen = ~np.isnan(errors)
     if not seen.any():
@@ -153,7 +159,7 @@ def depth_of_images(paths: Iterable[FrameFile], camera: CameraConfig) -> Iterato
 
 
 def write_scene_depth(collision: Path, plan: Path, camera: CameraConfig, out_depth: Path) -> None:
-    """Write what planned frames show, as depths of a collision mesh."""
+    """Write the depth of a collision mesh at the cells of planned frames."""
     # Scoring does without them.
     from synfeal.mesh.rays import RayCaster
     from synfeal.mesh.triangles import load_collision_mesh

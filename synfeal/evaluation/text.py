@@ -63,7 +63,13 @@ def scores_table(found: Evaluation) -> pd.DataFrame:
 
 
 def report_text(poses: Path, settings: Settings, found: Evaluation) -> str:
-    """Write the findings, then the table."""
+    """Format what ``synfeal evaluate`` prints: the findings, then the table of scores.
+
+    Args:
+        poses: File of the poses that were scored.
+        settings: How they were scored.
+        found: The scores.
+    """
     lines = [*_findings(poses, settings, found), ""]
     heads = [TITLES[end] for end in found.ends]
     rows = [
@@ -155,7 +161,13 @@ def figure_of(title: str, found: Evaluation) -> Figure:
 
 
 def write_files(out: Sequence[Path], title: str, found: Evaluation) -> None:
-    """Write scores (.csv), errors (.csv) and the figure (.png)."""
+    """Write scores, errors and the figure.
+
+    Args:
+        out: Three files, in this order: ``.csv``, ``.csv`` and ``.png``.
+        title: Title of the figure.
+        found: The scores.
+    """
     errors = pd.DataFrame({"frame": found.frames.names, **found.errors})  # inf: no pose
     for path, table in zip(out, (scores_table(found), errors), strict=False):
         write_frame(path, table, float_format=None)

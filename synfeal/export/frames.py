@@ -1,4 +1,8 @@
-"""Frames of a data set with poses, splits and camera: the input of every exporter."""
+"""Frames of a data set with poses, splits and camera: the input of every exporter.
+
+An exporter is called with an :class:`ExportSet`, an empty directory to fill, and a
+:data:`Place` that puts images there.
+"""
 
 from __future__ import annotations
 
@@ -161,10 +165,15 @@ def write_lines(path: Path, lines: Iterable[str]) -> None:
 
 
 def rewrite_depth(source: FrameFile, target: Path, units_per_m: int = 1000) -> float:
-    """Write a depth image anew; returns the share of known depths that are too large for it.
+    """Write a depth image in other units.
 
-    From a 16-bit PNG in millimetres, 0 or 65535 where there is no depth, to one of ``units_per_m``,
-    0 where there is none or it is beyond 65535 units.
+    Args:
+        source: 16-bit PNG in millimetres, 0 or 65535 where there is no depth.
+        target: 16-bit PNG to write, 0 where there is no depth or it is beyond 65535 units.
+        units_per_m: Units of ``target`` per metre.
+
+    Returns:
+        Share of the known depths that are beyond 65535 units.
     """
     depth_mm = read_depth_mm(source)
     known = (depth_mm > 0) & (depth_mm < INVALID_MM)

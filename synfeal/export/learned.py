@@ -48,7 +48,11 @@ from synfeal.records.tables import write_frame
 
 
 def export_ace(data: ExportSet, out: Path, place: Place) -> None:
-    """Write the splits; ACE knows one focal length and no distortion."""
+    """Write ``{train,test}/{rgb,poses,calibration}`` and, if there is depth, ``depth``.
+
+    Raises:
+        InputError: The camera has distortion or two focal lengths, which ACE does not know.
+    """
     need_splits(data)
     need_perspective(data, "ACE")
     camera = data.camera.intrinsics

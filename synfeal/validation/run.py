@@ -43,11 +43,14 @@ STEREO_PAIRS = 100  # of a large set are compared
 def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[Check]:
     """Check a data set; what is wrong with it is in the checks.
 
-    A calibration file is for a data set without a manifest, or with another camera; ``every_pair``
-    compares all pairs, not a sample of a large set.
+    Args:
+        dataset: The data set.
+        camera_file: Calibration file, for a data set without a manifest or with another camera;
+            None to take the camera from the manifest.
+        every_pair: Compare all pairs of frames, not a sample of a large set.
 
     Raises:
-        InputError: there is no data set, or ``camera_file`` cannot be read.
+        InputError: There is no data set, or ``camera_file`` cannot be read.
     """
     sequences = list_sequences(dataset)
     camera: KnownCamera | None = None
