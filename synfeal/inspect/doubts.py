@@ -153,10 +153,18 @@ def suggestion_doubts(suggestion: Suggestion) -> list[str]:
 
 
 def floor_areas_m2(normal: Array, position_m: Array, area_m2: float) -> Array:
-    """Estimate the area (3,) of the largest floor if x, y or z pointed up.
+    """Estimate the area of the largest floor if x, y or z pointed up.
 
     A floor is surface within 15 degrees of perpendicular to the axis, within 10 cm along it, in the
-    lower half of the mesh. From normals and positions (N, 3) of points spread evenly over it.
+    lower half of the mesh.
+
+    Args:
+        normal: Unit normals (N, 3) of points spread evenly over the mesh.
+        position_m: Positions (N, 3) of these points, metres.
+        area_m2: Area of the whole mesh, square metres.
+
+    Returns:
+        Areas (3,) for x, y and z, square metres.
     """
     middle_m = (position_m.min(axis=0) + position_m.max(axis=0)) / 2.0
     areas = np.zeros(3)
@@ -178,8 +186,11 @@ def load_as_meant(
 ) -> tuple[SceneConfig, TexturedMesh, list[str]]:
     """Load the mesh in the unit and with the up axis that make a room of it.
 
-    What the person said, such as the unit if it is given, is not changed, and nothing is while the
-    mesh makes sense as it is.
+    Nothing is changed that the person said, nor while the mesh makes sense as it is.
+
+    Args:
+        scene: Path, unit and up axis as they were given.
+        unit_is_given: Whether the person gave the unit, which is then kept.
 
     Returns:
         The scene as it was taken, the mesh, and a sentence for each thing that was assumed.

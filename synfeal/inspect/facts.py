@@ -167,7 +167,15 @@ N_RAYS = 5000
 def back_face_share(mesh: TexturedMesh, caster: RayCaster, space: FreeSpace) -> float | None:
     """Estimate the share of hits on back faces by random rays from a space's clear points.
 
-    A face shows its front where its vertices run counter-clockwise. None if nothing is hit.
+    A face shows its front where its vertices run counter-clockwise.
+
+    Args:
+        mesh: The mesh.
+        caster: Rays against ``mesh.merged()``, whose triangles are numbered in the same way.
+        space: Free space with the points that rays start from.
+
+    Returns:
+        Share from 0 to 1; None if there is no clear point, or nothing is hit.
     """
     clear_m = space.clear_m
     if not len(clear_m):

@@ -81,10 +81,14 @@ class FreeSpace:
 
 
 def survey(caster: RayCaster, surface_m: Array, box_m: Array) -> Survey:
-    """Cast rays from a grid of points in a box (2, 3), metres.
+    """Cast rays from a grid of points in a box, to tell inside from outside.
 
-    Winding cannot tell inside from outside in a scan, which is open; what rays hit can.
-    ``surface_m`` (N, 3) are points spread densely over the mesh.
+    Winding cannot tell that in a scan, which is open; what rays hit can.
+
+    Args:
+        caster: Rays against the mesh.
+        surface_m: Points (N, 3) spread densely over the mesh, world, metres.
+        box_m: Lower and upper corner (2, 3) of the box, world, metres.
     """
     axes, step_m = _grid(box_m)
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -50,13 +50,20 @@ WORLD_FROM_CAM_ABOVE: Array = np.diag([1.0, -1.0, -1.0])  # x right, y up in the
 
 
 def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> str:
-    """Write ``inspect.json``, ``inspect.png`` and ``inspect.html`` into ``out``; the text to print.
+    """Inspect a mesh and write ``inspect.json``, ``inspect.png`` and ``inspect.html``.
 
-    Earlier files of these names are replaced. A ``sampling_box`` of the scene confines the search
-    for free space; its unit may be doubted unless it is given.
+    Args:
+        scene: Path, unit and up axis of the mesh; its ``sampling_box``, if any, confines the search
+            for free space.
+        out: Directory to write into; earlier files of these names are replaced.
+        unit_is_given: Keep the scene's unit. Otherwise, and without a ``sampling_box``, one that
+            makes no room of the mesh is replaced.
+
+    Returns:
+        The findings as text to print.
 
     Raises:
-        InputError: the mesh cannot be used, the box misses it, or ``out`` holds other files.
+        InputError: The mesh cannot be used, the box misses it, or ``out`` holds other files.
     """
     refuse_foreign(out, OUTPUTS, "an inspection")
     found = Inspection.of(scene, unit_is_given or scene.sampling_box is not None)

@@ -300,6 +300,11 @@ def lit(mesh: TexturedMesh, suggestion: Suggestion, plain: float) -> Suggestion:
 
     A mesh of mostly plain colours gets ambient light, which belongs to the place, and the lamp at
     the camera only where frames would still be of one colour.
+
+    Args:
+        mesh: The mesh.
+        suggestion: The suggestion without light.
+        plain: Share of the mesh's surface, 0 to 1, that has plain colours.
     """
     shades: list[Shade | None] = ["ambient", "headlight"]
     if plain <= MAX_PLAIN:
@@ -314,7 +319,13 @@ def lit(mesh: TexturedMesh, suggestion: Suggestion, plain: float) -> Suggestion:
 
 
 def one_colour_share(mesh: TexturedMesh, poses: Array, shade: Shade | None) -> float:
-    """Draw some of the frames of poses (N, 4, 4), small, and measure the share of one colour."""
+    """Measure the share of frames that are of one colour, by drawing some of them, small.
+
+    Args:
+        mesh: The mesh.
+        poses: Poses (N, 4, 4); at most ``N_LOOKED_AT`` are drawn, spread evenly.
+        shade: Light to draw them in; None for colours as they are.
+    """
     shown = with_ambient_light(mesh) if shade == "ambient" else mesh
     index = np.linspace(0, len(poses) - 1, min(N_LOOKED_AT, len(poses))).round().astype(int)
     with open_renderer(shown, LOOK_CAMERA, RenderConfig(shade=shade)) as renderer:

@@ -133,8 +133,10 @@ class ViewerMesh:
     ) -> dict[str, Any]:
         """Build the argument of ``synfealViewer``, ready for JSON.
 
-        With lines through points (N, 3), metres, of a colour (0 to 255 each), and the heading of
-        the first view, 0 along x.
+        Args:
+            polylines: Points (N, 3) of each line, world, metres, and its red, green and blue from 0
+                to 255.
+            yaw_rad: Heading of the first view, radians, 0 along x.
         """
         return {
             "positions": _base64(self.positions, "<i2"),
@@ -175,9 +177,15 @@ def viewer_mesh(mesh: TexturedMesh, surface: SurfacePoints) -> ViewerMesh:
 
 
 def split_longest_edges(corners: Array, max_faces: int, min_edge_m: float) -> Array:
-    """Split triangles (F, 3, 3) at the middle of their longest edge, the longest edges first.
+    """Split triangles at the middle of their longest edge, the longest edges first.
 
-    Stops at ``max_faces`` triangles or when no edge is longer than ``min_edge_m``.
+    Args:
+        corners: Corners (F, 3, 3) of the triangles, metres.
+        max_faces: Number of triangles at which splitting stops.
+        min_edge_m: Longest edge that is not split, metres.
+
+    Returns:
+        Corners (G, 3, 3) of the triangles after splitting.
     """
     while len(corners) < max_faces:
         edges_m = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)

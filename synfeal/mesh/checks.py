@@ -74,10 +74,15 @@ def _extreme_colours(part: MeshPart) -> NDArray[np.float64]:
 
 
 def check_sampling_box(box: NDArray[np.float64], bounds_m: NDArray[np.float64], name: str) -> None:
-    """Refuse a box (2, 3) that misses the mesh's bounds (2, 3) or is of another scale.
+    """Refuse a box that misses the mesh or is of another scale.
 
     A box that misses the mesh, or a mesh more than a hundred times as large as the box, is almost
     always a file in millimetres or centimetres read as metres, or another up axis.
+
+    Args:
+        box: Lower and upper corner (2, 3) of the box, world, metres.
+        bounds_m: Lower and upper corner (2, 3) of the mesh, world, metres.
+        name: What messages call the mesh.
     """
     overlap = np.minimum(box[1], bounds_m[1]) - np.maximum(box[0], bounds_m[0])
     ratio = float(np.max(bounds_m[1] - bounds_m[0]) / np.max(box[1] - box[0]))

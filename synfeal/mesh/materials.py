@@ -192,10 +192,16 @@ def large_images_allowed() -> Iterator[None]:
 
 
 def decode(image: Image.Image | None, owner: str, findings: Findings) -> Pixels | None:
-    """Decode an image to pixels (H, W, 3 | 4) uint8; None if missing, broken or too large.
+    """Decode an image to 8-bit pixels.
 
-    What was converted, made smaller or given up goes to the findings, as ``owner``'s, such as
-    ``material 'Wall'``.
+    Args:
+        image: The opened image, or None where it is missing.
+        owner: What findings call the image's owner, such as ``material 'Wall'``.
+        findings: Collects what was converted, made smaller or given up.
+
+    Returns:
+        Pixels (H, W, 3), or (H, W, 4) with transparency, uint8; None if the image is missing,
+        damaged or too large.
     """
     if image is None:
         return None
@@ -218,7 +224,7 @@ def decode(image: Image.Image | None, owner: str, findings: Findings) -> Pixels 
 
 
 def within_limit(pixels: Pixels, owner: str, findings: Findings) -> Pixels:
-    """Shrink the pixels where a side exceeds what renderers take."""
+    """Shrink pixels (H, W, C) if a side exceeds what renderers take; see :func:`decode`."""
     height, width = pixels.shape[:2]
     if max(height, width) <= MAX_SIDE_PX:
         return pixels

@@ -87,7 +87,14 @@ def _spellings(name: str) -> dict[str, None]:
 
 
 def report_missing(missing: list[str], findings: Findings, gltf: Gltf | None) -> None:
-    """Note a warning per missing file, and one finding for those that no unlit render needs."""
+    """Report missing files: a warning for each, and one note for those that no unlit render needs.
+
+    Args:
+        missing: Names of the files as the mesh has them; repeated ones are reported once.
+        findings: Collects the reports.
+        gltf: The glTF file, which tells what a texture is used for; None for other formats, where
+            every file counts as needed.
+    """
     users: dict[str | None, list[str]] = {}
     header = {} if gltf is None else gltf.header
     for material in header.get("materials", []):

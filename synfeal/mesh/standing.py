@@ -71,7 +71,13 @@ def standing(
 
 
 def refuse_larger(size_m: Array, mesh: TexturedMesh, what: str) -> None:
-    """Check that an object of a size (3,) fits into the bounds of a scene, however it is turned."""
+    """Refuse an object that does not fit into the bounds of a scene, however it is turned.
+
+    Args:
+        size_m: Size (3,) of the object along its own axes, metres.
+        mesh: The scene.
+        what: What messages call the object.
+    """
     if (np.sort(size_m) > np.sort(np.ptp(mesh.bounds_m, axis=0))).any():
         shown = " x ".join(f"{side:.3g}" for side in size_m)
         raise InputError(f"{what} is {shown} m, larger than the scene; check its unit")

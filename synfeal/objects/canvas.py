@@ -49,8 +49,11 @@ class Canvas:
     ) -> NDArray[np.float32]:
         """Draw fractal value noise (H, W), zero mean and roughly unit deviation.
 
-        ``cell_m`` is the size of the coarsest cells (along x and y if a pair); the cells of each
-        octave are half as large as those of the one before.
+        Args:
+            cell_m: Size of the coarsest cells, metres; along x and y if a pair.
+            octaves: Number of layers that are added; the cells of each are half as large as in the
+                one before.
+            persistence: Deviation of each layer relative to the one before.
         """
         cells_m = cell_m if isinstance(cell_m, tuple) else (cell_m, cell_m)
         total = np.zeros((self.height_px, self.width_px), np.float32)
@@ -175,7 +178,14 @@ def tinted(image: ArrayLike, relief: NDArray[np.float32]) -> Pixels:
 
 
 def ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pixels:
-    """Blend from one colour to another along a direction (0 is right, π/2 is down)."""
+    """Blend from one colour to another across a canvas.
+
+    Args:
+        canvas: What is painted on.
+        first: Colour where the blend begins.
+        second: Colour where it ends.
+        angle_rad: Direction of the blend, radians: 0 is right, π/2 is down.
+    """
     x, y = canvas.coordinates_m()
     width, height = canvas.size_m
     along = np.cos(angle_rad) * (x / width - 0.5) + np.sin(angle_rad) * (y / height - 0.5) + 0.5
@@ -184,7 +194,7 @@ def ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pix
 
 
 def bordered(image: Pixels, share: float, colour: Colour) -> Pixels:
-    """Put a frame that takes ``share`` of the shorter side around the image."""
+    """Paint a frame as wide as ``share`` of the shorter side over the image's border, in place."""
     margin = max(1, round(share * min(image.shape[:2])))
     for edge in (image[:margin], image[-margin:], image[:, :margin], image[:, -margin:]):
         edge[:] = colour

@@ -35,7 +35,14 @@ def painted(canvas: Canvas, colour: Colour, wear: float = 0.05) -> Pixels:
 
 @painter
 def plaster(canvas: Canvas, colour: Colour, stains: float = 0.03, grain: float = 0.012) -> Pixels:
-    """Paint a painted wall: almost no texture, broad stains."""
+    """Paint a painted wall: almost no texture, broad stains.
+
+    Args:
+        canvas: What is painted on.
+        colour: Red, green and blue, 0 to 1.
+        stains: Standard deviation of the brightness, roughly, over most of a metre.
+        grain: The same over a few centimetres.
+    """
     return tinted(colour, stains * canvas.noise(0.9, 5, 0.65) + grain * canvas.noise(0.025, 2))
 
 
@@ -48,7 +55,16 @@ def wainscot(
     grain: float = 0.02,
     stains: float = 0.03,
 ) -> Pixels:
-    """Paint plaster with another colour and a rail up to ``height_m`` above the floor."""
+    """Paint plaster with another colour and a rail in its lower part.
+
+    Args:
+        canvas: What is painted on; its lower edge is the floor.
+        colour: Colour above the rail.
+        lower: Colour below the rail, where stains are twice as strong.
+        height_m: Height of the rail above the floor, metres.
+        grain: See :func:`plaster`.
+        stains: See :func:`plaster`.
+    """
     image = plaster(colour, stains, grain)(canvas)
     _, y = canvas.coordinates_m()
     above_floor = canvas.size_m[1] - y[:, 0]
@@ -80,8 +96,14 @@ def masonry(
 ) -> Pixels:
     """Paint tiles, bricks, planks or ashlar: blocks of random palette colours between joints.
 
-    ``stagger`` shifts every other row by that share of a block; ``spread`` is the deviation of the
-    blocks' brightness.
+    Args:
+        canvas: What is painted on.
+        palette: Colours of the blocks.
+        block_m: Width and height of a block, half a joint on each side included, metres.
+        joint_m: Width of the joints, metres.
+        joint: Colour of the joints.
+        stagger: Shift of every other row, as a share of a block.
+        spread: Standard deviation of the blocks' brightness.
     """
     x, y = canvas.coordinates_m()
     row = np.floor(y / block_m[1]).astype(np.int64)
@@ -103,7 +125,14 @@ def masonry(
 def fabric(
     canvas: Canvas, colour: Colour, stripe: Colour | None = None, pitch_m: float = 0.1
 ) -> Pixels:
-    """Paint cloth with a weave and, if given, stripes."""
+    """Paint cloth with a weave and, if wanted, vertical stripes.
+
+    Args:
+        canvas: What is painted on.
+        colour: Colour of the cloth; no channel may be 0 where there are stripes.
+        stripe: Colour of the stripes; None for no stripes.
+        pitch_m: Distance from one stripe to the next, metres; each takes 0.3 of it.
+    """
     image = tinted(colour, 0.06 * canvas.noise(0.012, 2) + 0.06 * canvas.noise(0.3, 3))
     if stripe is not None:
         x, _ = canvas.coordinates_m()
@@ -114,7 +143,14 @@ def fabric(
 
 @painter
 def marble(canvas: Canvas, colour: Colour, vein: Colour, scale_m: float = 0.35) -> Pixels:
-    """Paint polished stone with turbulent veins."""
+    """Paint polished stone with turbulent veins.
+
+    Args:
+        canvas: What is painted on.
+        colour: Colour of the stone.
+        vein: Colour of the veins.
+        scale_m: Size of the coarsest cells of the noise that veins follow, metres.
+    """
     turbulence = canvas.noise(scale_m, 6, 0.65)
     share = np.exp(-9 * np.abs(turbulence)).astype(np.float32)
     share = np.clip(share + 0.12 * canvas.noise(scale_m / 3, 4), 0, 1)
@@ -140,7 +176,14 @@ def rug(canvas: Canvas, palette: tuple[Colour, ...]) -> Pixels:
 
 @painter
 def damask(canvas: Canvas, colour: Colour, motif: Colour, pitch_m: float = 0.22) -> Pixels:
-    """Paint wallpaper with a repeated flower-like motif; repetition is the point."""
+    """Paint wallpaper with a repeated flower-like motif; repetition is the point.
+
+    Args:
+        canvas: What is painted on.
+        colour: Colour of the ground.
+        motif: Colour of the motif.
+        pitch_m: Distance from one motif to the next in a row, metres; rows are 0.8 of it apart.
+    """
     x, y = canvas.coordinates_m()
     row = np.floor(y / (0.8 * pitch_m))
     u = ((x / pitch_m + 0.5 * (row % 2)) % 1 - 0.5) * 2
@@ -201,7 +244,14 @@ def door(canvas: Canvas, colour: Colour, window: bool = False) -> Pixels:
 
 @painter
 def cabinet_front(canvas: Canvas, colour: Colour, doors: int = 2, rows: int = 1) -> Pixels:
-    """Paint doors or drawers side by side, each with a handle and a label."""
+    """Paint doors or drawers, each with a handle and a label.
+
+    Args:
+        canvas: What is painted on.
+        colour: Colour of the fronts, varied a little from one to the next.
+        doors: Number of them side by side.
+        rows: Number of them one above the other.
+    """
     sketch = Sketch(plaster(colour, 0.05, 0.03)(canvas))
     for column in range(doors):
         for row in range(rows):

@@ -50,7 +50,16 @@ def _shares(points: Points) -> NDArray[np.float64]:
 def bilinear(
     grid: NDArray[Real], row_at: NDArray[np.float64], column_at: NDArray[np.float64]
 ) -> NDArray[Real]:
-    """Interpolate a grid (R, C, K) at fractional row and column indices, as (A, B, K)."""
+    """Interpolate a grid bilinearly at every combination of some rows and columns.
+
+    Args:
+        grid: Values (R, C, K), at least 2 x 2.
+        row_at: Fractional indices (A,) of rows.
+        column_at: Fractional indices (B,) of columns.
+
+    Returns:
+        Values (A, B, K).
+    """
     top = np.clip(np.floor(row_at).astype(np.int64), 0, grid.shape[0] - 2)
     left = np.clip(np.floor(column_at).astype(np.int64), 0, grid.shape[1] - 2)
     below = (row_at - top)[:, None, None].astype(grid.dtype)
@@ -91,7 +100,17 @@ def joined(*things: Item | Iterable[Item]) -> Item:
 def upright(
     start_xy: tuple[float, float], end_xy: tuple[float, float], low_m: float, high_m: float
 ) -> Points:
-    """Return a vertical sheet; seen from its front, ``start_xy`` is left and ``end_xy`` right."""
+    """Return the corners of a vertical sheet, as a grid of points.
+
+    Args:
+        start_xy: End of the sheet that is on the left as seen from its front, metres.
+        end_xy: End that is on the right, metres.
+        low_m: Height of the lower edge, metres.
+        high_m: Height of the upper edge, metres.
+
+    Returns:
+        Points (2, 2, 3), the upper edge first.
+    """
     rows = [[(*start_xy, z), (*end_xy, z)] for z in (high_m, low_m)]
     return np.array(rows, np.float64)
 
@@ -99,7 +118,17 @@ def upright(
 def level(
     x_m: tuple[float, float], y_m: tuple[float, float], z_m: float, face_down: bool = False
 ) -> Points:
-    """Return a horizontal sheet that faces up (a floor) or down (a ceiling)."""
+    """Return the corners of a horizontal sheet, as a grid of points.
+
+    Args:
+        x_m: Least and greatest x, metres.
+        y_m: Least and greatest y, metres.
+        z_m: Height, metres.
+        face_down: Face down, as a ceiling; otherwise up, as a floor.
+
+    Returns:
+        Points (2, 2, 3).
+    """
     x0, x1 = x_m[::-1] if face_down else x_m
     return np.array([[(x0, y, z_m), (x1, y, z_m)] for y in y_m[::-1]], np.float64)
 
