@@ -131,8 +131,10 @@ def refuse_existing(path: Path) -> None:
 def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
     """Refuse a directory with anything but what an earlier command of the same kind wrote.
 
-    ``own`` names the files that may be replaced; ``origin`` says what writes them, as in "is not
-    from a comparison".
+    Args:
+        out: Directory to write into, which need not exist.
+        own: Names of the files that may be replaced.
+        origin: What writes them, for messages, as in "is not from a comparison".
     """
     if os.path.lexists(out) and not out.is_dir():
         raise InputError(f"{out}: is a file; choose another directory with --out")

@@ -86,9 +86,20 @@ def read_frame(path: Path, schema: Schema, remedy: str = REMEDY, sep: str = ",")
 def read_records(
     path: Path, needed: Iterable[str] = (), remedy: str = REMEDY, sep: str = ","
 ) -> list[tuple[int, dict[str, str]]]:
-    """Read the rows of a file, each with its line number: cells by column, as text.
+    """Read the rows of a file as text.
 
-    See :func:`read_frame`.
+    Args:
+        path: CSV file.
+        needed: Columns it must have.
+        remedy: What to do where the file cannot be used, for messages.
+        sep: Separator of its cells.
+
+    Returns:
+        Line number of each row, 1 for the header's, and its cells by column.
+
+    Raises:
+        InputError: The file is missing or no CSV, lacks a column, has one twice, or has a row of
+            another length.
     """
     with read_as(path, "CSV", OSError, UnicodeDecodeError, remedy=f"; {remedy}"):
         text = path.read_text(encoding="utf-8-sig")  # spreadsheets add a mark
@@ -222,7 +233,14 @@ def rows_of(frame: pd.DataFrame) -> list[Any]:
 def write_frame(
     path: Path, frame: pd.DataFrame, float_format: str | None = "%.6g", na_rep: str = ""
 ) -> None:
-    """Write a frame: floats with six significant digits, or all of them with None."""
+    """Write a frame as CSV, without its index.
+
+    Args:
+        path: File to write.
+        frame: The table.
+        float_format: Format of floats, ``%`` style; None for as many digits as tell them apart.
+        na_rep: Text for missing values.
+    """
     with atomic_path(path) as temporary:
         frame.to_csv(
             temporary,

@@ -44,10 +44,15 @@ INSTALL = {
 def open_renderer(
     mesh: TexturedMesh, camera: CameraConfig, render: RenderConfig | None = None
 ) -> Renderer:
-    """Open a renderer of ``mesh`` through ``camera`` as a context manager, by the chosen backend.
+    """Open a renderer as a context manager.
+
+    Args:
+        mesh: What is drawn.
+        camera: Camera of any model, with or without distortion.
+        render: Backend and settings; None for the defaults.
 
     Raises:
-        InputError: the backend named in ``render`` does not work on this machine, or none does.
+        InputError: The backend named in ``render`` does not work on this machine, or none does.
     """
     if camera.projection is not None:
         from synfeal.render.cube import CubeRenderer  # loads SciPy: only when needed

@@ -107,9 +107,17 @@ def covering_camera(camera: CameraConfig) -> CameraConfig:
 def resampled_depth(
     depth_m: Depth, index: NDArray[np.int32], weight: NDArray[np.floating]
 ) -> Depth:
-    """Interpolate depth (...) of a pinhole image (h, w) between pixels; metres, inf for nothing.
+    """Interpolate the depth of a pinhole image between its pixels.
 
-    ``index`` (..., 4) are the neighbours of each point in the flat image, ``weight`` theirs.
+    Across edges and creases, and beside nothing, the nearest pixel is taken instead.
+
+    Args:
+        depth_m: Depth (h, w), metres, inf for nothing.
+        index: Neighbours (..., 4) of each point in the flat image, see :func:`taps`.
+        weight: Weights (..., 4) of the neighbours.
+
+    Returns:
+        Depth (...), metres, inf for nothing.
     """
     inverse = 1.0 / depth_m
     values = inverse.reshape(-1)[index]

@@ -218,9 +218,15 @@ class MipMaps:
                 self._texels[start:end] = texels
 
     def rgba(self, texture: NDArray[np.intp], uv: Floats, uv_per_px: Floats) -> Rgba:
-        """Look up colours (N, 4), 0 to 255, of textures (N,) at ``uv`` (N, 2), origin bottom left.
+        """Look up colours.
 
-        ``uv_per_px`` (N, 4) is the change from pixel to pixel: du/dx, dv/dx, du/dy, dv/dy.
+        Args:
+            texture: Index (N,) of the texture of each point.
+            uv: Texture coordinates (N, 2), origin at the bottom left.
+            uv_per_px: Their change (N, 4) from pixel to pixel: du/dx, dv/dx, du/dy, dv/dy.
+
+        Returns:
+            Colours (N, 4), 0 to 255.
         """
         ux, vx, uy, vy = (uv_per_px * np.tile(self._size[texture, 0], 2)).T
         squared = np.maximum(np.maximum(ux**2 + vx**2, uy**2 + vy**2), 1.0)

@@ -95,7 +95,14 @@ def sightings_of(
     camera: RgbdCamera,
     on_frame: Callable[[], object] = lambda: None,
 ) -> Sightings:
-    """Look up a sample of points in some of the photographs, evenly spread over the sequence."""
+    """Look up a sample of points in some of the photographs, evenly spread over the sequence.
+
+    Args:
+        surface: Points of the scan, with normals.
+        frames: Photographs with depth images and poses.
+        camera: Cameras of both.
+        on_frame: Called after each photograph.
+    """
     rng = np.random.default_rng(0)
     count = min(N_POINTS, len(surface.vertices_m))
     chosen = np.sort(rng.choice(len(surface.vertices_m), count, replace=False))

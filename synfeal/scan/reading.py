@@ -43,10 +43,18 @@ def read_depth_m(path: FrameFile, units_per_m: float, size: tuple[int, int]) -> 
 
 
 def read_color(path: FrameFile, size: tuple[int, int], shrink: int = 1) -> NDArray[np.uint8]:
-    """Read a photograph as (H, W, 3), by area to one ``shrink``-th of its sides.
+    """Read a photograph.
+
+    Args:
+        path: Image file.
+        size: Width and height it must have, pixels.
+        shrink: Factor by which both sides are made shorter, averaging pixels.
+
+    Returns:
+        Colours (H, W, 3).
 
     Raises:
-        InputError: It is missing, damaged, or not of ``size`` (width, height).
+        InputError: It is missing, damaged, or of another size.
     """
     image = read_image(path, "RGB")
     _check_size(path, image.size, size)

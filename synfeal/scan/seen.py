@@ -75,9 +75,15 @@ def seen_points(
 
 
 def project(local_m: Floats, camera: CameraConfig, intrinsics: Intrinsics | None = None) -> Floats:
-    """Project points (M, 3) in front of a camera to pixels (M, 2).
+    """Project points in front of a perspective camera.
 
-    Other ``intrinsics`` take the place of the camera's.
+    Args:
+        local_m: Points (M, 3) in the frame of the camera, metres.
+        camera: The camera.
+        intrinsics: Intrinsics in place of the camera's.
+
+    Returns:
+        Pixels (M, 2), column and row, inside the image or not.
     """
     fx, fy, cx, cy = (np.float32(value) for value in intrinsics or camera.intrinsics)
     normalised = local_m[:, :2] / local_m[:, 2:]
@@ -88,7 +94,7 @@ def project(local_m: Floats, camera: CameraConfig, intrinsics: Intrinsics | None
 
 
 def within(pixel: Floats, width: int, height: int, margin_px: float) -> NDArray[np.bool_]:
-    """Mark pixels (M, 2) that lie in an image: (M,); NaN does not."""
+    """Mark pixels (M, 2) in an image and ``margin_px`` from its border: (M,); NaN is not."""
     x, y = pixel[:, 0], pixel[:, 1]
     return (x >= margin_px) & (x < width - margin_px) & (y >= margin_px) & (y < height - margin_px)
 

@@ -96,7 +96,14 @@ def check_consistency(
     camera: KnownCamera,
     on_pair: Callable[[], object],
 ) -> list[Check]:
-    """Compare every pair; one check for each measure and one for the camera."""
+    """Compare pairs of frames: check their overlap, each measure and the camera.
+
+    Args:
+        pairs: Pairs of frames of one sequence.
+        poses: Poses of all of these frames.
+        camera: Camera of the frames. If it is assumed, checks report what they find as skipped.
+        on_pair: Called after each pair.
+    """
     config = camera.depth
     step = max(1, round(math.sqrt(config.width * config.height / GRID_PIXELS)))
     lens = lens_of(config, step)

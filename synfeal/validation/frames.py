@@ -86,8 +86,11 @@ def check_images(
 ) -> list[Check]:
     """Check that every image decodes fully, has the camera's size, and shows something.
 
-    Without a camera all must be of the size of the first one, and depth, which then comes from a
-    sensor, does not tell what is empty.
+    Args:
+        sequences: Sequences of the data set.
+        camera: Camera of the frames. Without one, all images must be of the size of the first, and
+            depth, which then comes from a sensor, does not tell what is empty.
+        on_frame: Called after each frame.
     """
     size = (camera.width, camera.height) if camera else None
     readers: dict[str, Callable[[FrameFile], Pixels]] = {

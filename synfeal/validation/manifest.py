@@ -20,7 +20,14 @@ def check_manifest(
     splits: Mapping[str, list[SequenceListing]],
     on_frame: Callable[[], object],
 ) -> Check:
-    """Check that the manifest's statements about each sequence are true."""
+    """Check that the manifest's statements about each sequence are true.
+
+    Args:
+        dataset: The data set.
+        sequences: All of its sequences.
+        splits: Sequences by split, see :func:`read_splits`.
+        on_frame: Called for each frame of the sequences that the manifest lists.
+    """
     path = dataset / MANIFEST
     if not path.exists():
         return Check("manifest", f"no {MANIFEST}: nothing says what was written", skipped=True)
@@ -125,7 +132,15 @@ def check_splits(
     splits: Mapping[str, list[SequenceListing]],
     unreadable: tuple[str, ...],
 ) -> Check:
-    """Check that each sequence is in one split, once."""
+    """Check that each sequence is in one split, once.
+
+    Args:
+        dataset: The data set.
+        sequences: All of its sequences.
+        splits: Sequences by split, see :func:`read_splits`.
+        unreadable: What is wrong with the files that list the splits, see :func:`read_splits`. If
+            anything is, a sequence may be in no split.
+    """
     uses = Counter(sequence.name for listed in splits.values() for sequence in listed)
     names = " and ".join(SPLIT_FILES.values())
     failures = [

@@ -136,9 +136,16 @@ PAIRS_PER_GAP = 200  # evenly spread over larger sets
 def choose_pairs(
     sequences: Iterable[SequenceListing], usable: Poses, every: bool
 ) -> list[tuple[Frame, Frame]]:
-    """Choose pairs ``GAPS`` frames apart, and each frame with those of the most similar poses.
+    """Choose pairs of frames ``GAPS`` apart, and of each frame with those of most similar poses.
 
-    Of a sequence each; at most ``PAIRS_PER_GAP`` of each kind unless ``every``.
+    Args:
+        sequences: Sequences of the data set; both frames of a pair are of one.
+        usable: Poses of the frames that may be chosen.
+        every: Take all pairs; otherwise at most ``PAIRS_PER_GAP`` for each gap and as many of
+            similar poses, evenly spread.
+
+    Returns:
+        Pairs, the earlier frame first.
     """
     sequences = list(sequences)
     kinds = [

@@ -46,7 +46,7 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     Args:
         dataset: The data set.
         camera_file: Calibration file, for a data set without a manifest or with another camera;
-            None to take the camera from the manifest.
+            None for the manifest's camera, or that of 7-Scenes where there is no manifest.
         every_pair: Compare all pairs of frames, not a sample of a large set.
 
     Raises:
