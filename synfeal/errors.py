@@ -41,7 +41,7 @@ class InputError(Exception):
 
 
 def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
-    """Carry out what a command does: 0, or 1 with ``error: ...`` for what a person can fix.
+    """Run a command; return 0, or print ``error: ...`` for what a person can fix and return 1.
 
     That is an :class:`InputError`, too little memory, and what the system refuses: a full or
     read-only disk, a name that is too long, links that lead in a circle. Ctrl-C is 130, with what

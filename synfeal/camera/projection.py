@@ -61,7 +61,7 @@ class Camera(Protocol):
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """Resolved, whichever way they were given."""
+        """Intrinsics, pixels, whether given or derived from the field of view."""
 
     @property
     def distortion(self) -> tuple[float, float, float, float, float]:

@@ -16,7 +16,7 @@ from synfeal.errors import exit_status
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Wrong usage ends in one line; no option is guessed from its beginning."""
+    """Parser that reports wrong usage in one line and guesses no option from its beginning."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(allow_abbrev=False, **settings)

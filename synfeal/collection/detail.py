@@ -121,7 +121,7 @@ def write_detail(
 def choose_detail(
     mesh: TexturedMesh, camera: CameraConfig, poses: Poses, render: RenderConfig
 ) -> Detail:
-    """Choose what to draw frames of, by least time times error within the error that is granted.
+    """Choose the mesh to draw frames of: least time times error among those exact enough.
 
     Textures come first, as triangles do not change which size of them is best.
 

@@ -48,7 +48,7 @@ from synfeal.render.surface import Layers
 
 
 class Progress(tqdm):  # type: ignore[type-arg]
-    """Frames done of all that are to be rendered: a bar on a terminal, one line a sequence else."""
+    """Frames done of all that are to be rendered: a bar on a terminal, or one line per sequence."""
 
     def __init__(self, n_frames: int, name: str, n_done: int = 0) -> None:
         super().__init__(total=n_frames, initial=n_done, unit="frame", desc=name, disable=None)

@@ -91,7 +91,7 @@ class LightState:
 
     @property
     def weights(self) -> dict[str, float] | None:
-        """Of the groups of sources, where they are switched."""
+        """Weight of each group of sources; None where they are not switched."""
         return dict(zip(GROUPS, STATES[self.state], strict=True)) if self.state else None
 
     @property
@@ -122,7 +122,7 @@ def drawn_light(config: LightConfig, rng: np.random.Generator) -> LightState:
 
 
 class AutoExposure:
-    """A first-order lag in stops behind what the frames before were metered at."""
+    """Exposure that follows the metering of earlier frames with a first-order lag in stops."""
 
     def __init__(self, config: ExposureConfig) -> None:
         self._config = config

@@ -102,12 +102,23 @@ class SceneRenderer(Renderer):
         mesh: TexturedMesh,
         camera: CameraConfig,
         render: RenderConfig,
-        shares: Mapping[str, TexturedMesh] | None = None,  # of its light, by group of sources
+        shares: Mapping[str, TexturedMesh] | None = None,
         crowd: Crowd | None = None,
-        # gives what depth is taken of, where ``mesh`` has less detail
         full: Callable[[], TexturedMesh] | None = None,
-        placed: Sequence[str] = (),  # names of the objects that are in the full mesh
+        placed: Sequence[str] = (),
     ) -> None:
+        """Open renderers of the scene and of its shares of light.
+
+        Args:
+            mesh: Mesh that colours are drawn of.
+            camera: Camera of the frames.
+            render: How they are drawn.
+            shares: The mesh in the light of each group of sources alone, by the group's name; None
+                where light is not switched.
+            crowd: Objects that may stand along paths, if any.
+            full: Loads the full mesh, which depth is taken of; None where ``mesh`` is that.
+            placed: Names of the objects that are in the full mesh, in the order of their numbers.
+        """
         self._camera, self._render, self._crowd = camera, render, crowd
         self._mesh, self._full, self._placed = mesh, full, placed
         self._ideal = open_renderer(mesh, camera, render)
@@ -126,7 +137,7 @@ class SceneRenderer(Renderer):
         return self._ideal.render(world_from_cam), self._solid.render_depth(world_from_cam)
 
     def render_faces(self, world_from_cam: Array) -> Faces:
-        """Index (H, W) of the triangle of the full mesh that each pixel shows, -1 for nothing."""
+        """Return the triangle (H, W) of the full mesh that each pixel shows, -1 for nothing."""
         renderer = self._ideal if self._full is None else self._solid
         return renderer.render_faces(world_from_cam)
 

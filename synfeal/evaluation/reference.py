@@ -80,7 +80,7 @@ def _refuse_twice(path: Path, found: Estimates, names: tuple[str, ...]) -> None:
 
 
 def _sequences(names: tuple[str, ...]) -> NDArray[np.int64]:
-    """Index (N,) of the folder that each name begins with; 0 where there is none."""
+    """Return the index (N,) of the folder that each name begins with; 0 where there is none."""
     folders = [name.rpartition("/")[0] for name in names]
     return np.unique(folders, return_inverse=True)[1].astype(np.int64)
 
@@ -129,7 +129,7 @@ def match_reference(frames: ScoredFrames, estimates: Estimates, path: Path) -> N
 def met_in_time(
     frames: ScoredFrames, estimates: Estimates, path: Path
 ) -> tuple[ScoredFrames, NDArray[np.int64]]:
-    """Leave the frames out at whose times nothing was estimated.
+    """Leave out the frames at whose times nothing was estimated.
 
     A reference has as many poses a second as its sensor gave; nothing says that more of them were
     to be estimated.

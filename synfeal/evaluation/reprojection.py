@@ -126,7 +126,7 @@ def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig)
 
 
 def write_cell_depth(path: Path, depth_m: Array) -> None:
-    """Keep depths (N, 48) in whole millimetres, 0 where there is none."""
+    """Write depths (N, 48) in whole millimetres, 0 where there is none."""
     depth_mm = np.where(np.isfinite(depth_m), np.round(depth_m * 1000), 0).clip(0, 65535)
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         np.save(file, depth_mm.astype(np.uint16))

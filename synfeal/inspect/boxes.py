@@ -89,7 +89,7 @@ def one_room(wanted: Mask, left: Mask, lower: Corner, upper: Corner) -> tuple[Co
 
 
 def _at_camera_height(space: FreeSpace) -> Mask:
-    """Clear points (X, Y, Z) that lie 0.8 to 2.0 m above a floor of the space."""
+    """Mark the clear points (X, Y, Z) that lie 0.8 to 2.0 m above a floor of the space."""
     low, high = CAMERA_HEIGHT_M
     at_height = np.zeros(len(space.axes_m[2]), dtype=np.bool_)
     for floor_m in space.floors_m or (() if space.floor_m is None else (space.floor_m,)):

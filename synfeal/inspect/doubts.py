@@ -76,7 +76,7 @@ def doubts_of(
 
 
 def units_of_a_room(longest: float) -> list[float]:
-    """Usual units, metres, in which a mesh so long in its own unit has the size of a room."""
+    """List the usual units, in metres, in which a mesh of this length is as large as a room."""
     low_m, high_m = EXTENTS_M
     return [unit_m for unit_m in sorted({1.0, *UNITS_M}) if low_m <= longest * unit_m <= high_m]
 

@@ -64,7 +64,7 @@ class Emptiness:
 
     @property
     def is_little(self) -> bool:
-        """Check whether a data set may be so."""
+        """Check whether a data set may show this much of nothing."""
         return self.share <= MAX_EMPTY and self.mostly_empty_frames <= MAX_MOSTLY_EMPTY
 
 

@@ -226,7 +226,7 @@ def _normals(corners: Array) -> Array:
 
 
 def _features(position_m: Array, normal: Array) -> Array:
-    """Place and facing (N, 6), so that two sides of a thin wall keep their own colours."""
+    """Join place and facing (N, 6), so that two sides of a thin wall keep their own colours."""
     return np.hstack([position_m, NORMAL_M * normal])
 
 

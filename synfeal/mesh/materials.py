@@ -74,7 +74,7 @@ class MaterialReader:
         return self._known[id(material)]
 
     def vertex_rgb(self, geometry: trimesh.Trimesh) -> Pixels | None:
-        """Display colours (V, 3) of the vertices of a trimesh geometry, if it has any."""
+        """Return the sRGB colours (V, 3) of a trimesh geometry's vertices; None if it has none."""
         exact = geometry.vertex_attributes.get(SRGB_ATTRIBUTE)
         if exact is not None:
             return np.asarray(exact, dtype=np.uint8)[:, :3]
@@ -164,7 +164,7 @@ def uv_transform(slot: Json) -> NDArray[np.float64] | None:
 
 
 def srgb_from_linear(rgba: ArrayLike) -> Pixels:
-    """Display colours (..., 4) uint8 of linear ones in 0 to 1; alpha is linear in both."""
+    """Convert linear colours (..., 4), 0 to 1, to sRGB uint8; alpha is linear in both."""
     value = np.clip(np.asarray(rgba, dtype=np.float64), 0.0, 1.0)
     value[..., :3] = linear_to_srgb(value[..., :3])
     return np.round(255.0 * value).astype(np.uint8)

@@ -87,7 +87,7 @@ class Ground:
     """Surface that objects stand on, and must not touch."""
 
     def __init__(self, corners: Array, path_m: Array | None) -> None:
-        """Take what :func:`standing` takes."""
+        """Prepare the surface; the arguments are those of :func:`standing`."""
         self._corners = corners
         index = np.arange(3 * len(corners)).reshape(-1, 3)
         self._caster = RayCaster(corners.reshape(-1, 3), index)

@@ -127,7 +127,7 @@ def in_image(camera: CameraConfig, world_from_cam: Array, points_m: Array) -> ND
 
 @dataclass(frozen=True)
 class EmptyPixels:
-    """Shares of what a plan's frames would see that is nothing."""
+    """Shares of a plan's frames that show nothing."""
 
     share: float  # of all pixels
     worst_frame_share: float  # of the pixels of the emptiest frame

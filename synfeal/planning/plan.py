@@ -99,7 +99,7 @@ def sampling_box_of(scene: SceneConfig, mesh_bounds_m: Array, name: str) -> Arra
 
 
 def box_array(box: Box) -> Array:
-    """Lower and upper corner (2, 3) of a configured box, metres."""
+    """Return the lower and upper corner (2, 3) of a configured box, metres."""
     return np.array([box.x, box.y, box.z], dtype=np.float64).T
 
 
@@ -225,7 +225,7 @@ class _Turns:
         return int(self.made.sum())
 
     def next(self, n_frames: int) -> int:
-        """Index of the box, which is given ``n_frames``."""
+        """Return the index of the next box, and count ``n_frames`` as made in it."""
         index = int(np.argmax(self._share * (self.total + 1) - self.made))
         self.made[index] += n_frames
         return index

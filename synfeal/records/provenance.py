@@ -76,7 +76,7 @@ def config_hash(model: BaseModel) -> str:
 
 
 def git_commit(folder: Path) -> str:
-    """Commit checked out around ``folder``, with ``-dirty`` after it when tracked files changed.
+    """Return the commit checked out around ``folder``, with ``-dirty`` if tracked files changed.
 
     Changed results do not count: publishing one run must not mark the next one.
     ``unknown`` outside a repository and without git: an installed package has no commit.

@@ -53,7 +53,7 @@ class Renderer(Protocol):
         return self.render_rgbd(world_from_cam)[1]
 
     def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
-        """Index (H, W) of the triangle at the centre of each pixel, -1 for nothing.
+        """Return the index (H, W) of the triangle at the centre of each pixel, -1 for nothing.
 
         Triangles are counted through all parts of the mesh, as :meth:`TexturedMesh.merged` does.
         """

@@ -75,7 +75,7 @@ def open_renderer(
 
 @functools.cache
 def fastest_working() -> str:
-    """Name of the fastest backend that works here; says so once, and warns of each that does not.
+    """Return the fastest backend that works here; log its name, and warn of faster ones that fail.
 
     Raises:
         InputError: none works.

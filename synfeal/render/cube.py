@@ -101,7 +101,7 @@ class CubeRenderer(Renderer):
         return self._distance(np.stack(self._drawn_by(self._inner.render_depth, world_from_cam)))
 
     def render_faces(self, world_from_cam: Array) -> Faces:
-        """Index (H, W) of the triangle that the nearest pixel of a cube's face shows, or -1."""
+        """Return the triangle (H, W) that the nearest pixel of a cube's face shows, or -1."""
         index, weight = self._depth_taps
         nearest = np.take_along_axis(index, weight.argmax(axis=-1)[..., None], axis=-1)[..., 0]
         drawn = np.stack(self._drawn_by(self._inner.render_faces, world_from_cam))

@@ -63,7 +63,7 @@ class DistortedRenderer(Renderer):
         return resampled_depth(self._inner.render_depth(world_from_cam), *self._depth_taps)
 
     def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
-        """Index (H, W) of the triangle that the nearest pixel of the inner image shows, or -1."""
+        """Return the triangle (H, W) that the nearest pixel of the inner image shows, or -1."""
         index, weight = self._depth_taps
         nearest = np.take_along_axis(index, weight.argmax(axis=-1)[..., None], axis=-1)[..., 0]
         return self._inner.render_faces(world_from_cam).reshape(-1)[nearest]

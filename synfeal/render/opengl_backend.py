@@ -151,7 +151,7 @@ class OpenglRenderer(Renderer):
             return self._draw_depth(self._clip_from_mesh(world_from_cam))
 
     def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
-        """Index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
+        """Return the index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
         clip_from_mesh = self._clip_from_mesh(world_from_cam)
         halves = np.empty((*self._size[::-1], 2), np.float32)
         with self._context:
@@ -235,7 +235,7 @@ class OpenglRenderer(Renderer):
 
 
 def window_from_clip(window: Window, size: tuple[int, int]) -> NDArray[np.float64]:
-    """Map (4, 4) clip coordinates of an image (width, height) to those of a part of it."""
+    """Return the map (4, 4) from clip coordinates of an image (width, height) to a part's."""
     matrix = np.eye(4)
     ends = zip(size, window[:2], window[2:], strict=True)
     for axis, (side, low, high) in enumerate(ends):

@@ -63,7 +63,7 @@ def chunks_of(vertices_m: Floats, faces: NDArray[np.int64]) -> Chunks:
 
 
 def _morton_codes(points_m: Floats) -> NDArray[np.int64]:
-    """Place of each point (N, 3) on a Z-order curve through their bounding cube."""
+    """Return the place of each point (N, 3) on a Z-order curve through their bounding cube."""
     lower = points_m.min(axis=0)
     side = max(float(np.ptp(points_m, axis=0).max()), np.finfo(np.float64).tiny)
     cells = 1 << BITS_PER_AXIS

@@ -137,7 +137,7 @@ class PyrenderRenderer(Renderer):
         return np.where(depth_m > 0.0, depth_m, np.float32(np.inf))
 
     def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
-        """Index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
+        """Return the index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
         self._look_from(world_from_cam)
         self._faces.first_face = self._first_face
         return faces_of_halves(self._drawn(self._faces, 1, np.zeros(4))[..., :2])
@@ -208,13 +208,23 @@ class _Pass(pyrender.Renderer):  # type: ignore[misc]  # pyrender is untyped
 
     def __init__(
         self,
-        uploaded: set[Any],  # the meshes that are in the context, shared by both passes
-        output: int,  # of the shader that is drawn
-        level_bias: float,  # added to the mip level of textures
-        storage: Any,  # OpenGL's format of what is drawn
-        read_as: tuple[Any, Any],  # channels and their type
+        uploaded: set[Any],
+        output: int,
+        level_bias: float,
+        storage: Any,
+        read_as: tuple[Any, Any],
         dtype: type,
     ) -> None:
+        """Make the framebuffer that the pass draws into.
+
+        Args:
+            uploaded: Meshes that are in the context, shared by all passes.
+            output: Number of the shader's output that is drawn.
+            level_bias: Added to the mip level of textures.
+            storage: OpenGL's format of what is drawn.
+            read_as: OpenGL's channels, and their type, in which it is read.
+            dtype: NumPy's type of the same.
+        """
         super().__init__(16, 16)
         self._program_cache = ShaderProgramCache(str(SHADERS))
         self._uploaded, self._level_bias = uploaded, level_bias

@@ -48,7 +48,7 @@ class RaycastRenderer(Renderer):
         return rgb, self._image(self._depth, world_from_cam, np.full((1, 2), 0.5), 0.0)
 
     def render_faces(self, world_from_cam: NDArray[np.float64]) -> Faces:
-        """Index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
+        """Return the index (H, W) of the triangle at the centre of each pixel, -1 for nothing."""
         return self._image(self._faces, world_from_cam, np.full((1, 2), 0.5), 0.0)
 
     def draw_only(self, window: Window | None) -> None:

@@ -156,7 +156,7 @@ class ColorFit:
 
     @property
     def focal_change(self) -> float:
-        """By how much the fitted focal length is longer, relative."""
+        """Relative change from the given focal length to the fitted one."""
         return self.fitted.intrinsics.fx / self.given.intrinsics.fx - 1.0
 
     @property

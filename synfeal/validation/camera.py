@@ -226,7 +226,7 @@ def _angle_rad(points_m: Array) -> Array:
 
 
 def colmap_camera(camera: CameraConfig, moved: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:
-    """Make COLMAP's camera.
+    """Build the ``pycolmap.Camera`` of a camera.
 
     Args:
         camera: The camera.

@@ -41,7 +41,7 @@ STEREO_PAIRS = 100  # of a large set are compared
 
 
 def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[Check]:
-    """Check a data set; what is wrong with it is in the checks.
+    """Run all checks of a data set and return what each found.
 
     Args:
         dataset: The data set.
