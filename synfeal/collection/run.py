@@ -80,7 +80,14 @@ def refuse_invisible(
 def refuse_blank(
     caster: RayCaster, plans: Mapping[Split, PoseTable], camera: CameraConfig, scene: SceneConfig
 ) -> None:
-    """Warn of plans whose images would show little; refuse those that would show nothing."""
+    """Warn of plans whose images would show little; refuse those that would show nothing.
+
+    Args:
+        caster: Rays against the collision mesh.
+        plans: Poses by split.
+        camera: Camera of the frames.
+        scene: Settings of the scene: messages name its mesh and say what to change.
+    """
     name = scene.path
     for split, plan in plans.items():
         share = empty_pixels(caster, plan, camera).share

@@ -94,10 +94,14 @@ class Crop(NamedTuple):
 
 
 def crop_of(size: tuple[int, int], input_px: int, view: View = "square") -> Crop:
-    """Return what localizers see of a frame of ``size`` (width, height), pixels.
+    """Return what localizers see of a frame.
 
-    ``square``: as in the published code, the short side becomes ``input_px + 1`` and the centre is
-    cut out. ``whole``: all of it, squeezed into the square; nothing the camera saw is lost.
+    Args:
+        size: Width and height of the frame, pixels.
+        input_px: Side of the square that localizers see, pixels.
+        view: ``square``: as in the published code, the short side becomes ``input_px + 1`` and the
+            centre is cut out. ``whole``: all of it, squeezed into the square; nothing the camera
+            saw is lost.
     """
     if view == "whole":
         return Crop(input_px, input_px, 0, 0)

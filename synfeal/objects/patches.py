@@ -76,7 +76,14 @@ class Item:
     patches: tuple[Patch, ...]
 
     def placed(self, x_m: float, y_m: float, z_m: float = 0.0, yaw_deg: float = 0.0) -> Item:
-        """Return the item turned about z, then moved."""
+        """Return the item turned about z, then moved.
+
+        Args:
+            x_m: Shift along x, metres.
+            y_m: Shift along y, metres.
+            z_m: Shift along z, metres.
+            yaw_deg: Turn in degrees, counter-clockwise as seen from above.
+        """
         yaw = np.radians(yaw_deg)
         cos, sin = np.cos(yaw), np.sin(yaw)
         world_from_item = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])

@@ -180,7 +180,15 @@ class PoseSpace:
         rng: np.random.Generator,
         clearance: Clearance | None = None,
     ) -> Self:
-        """Build the space of a box (2, 3) with a scene's angles, view distance and ``min_seen``."""
+        """Build the space of a box with a scene's angles, view distance and ``min_seen``.
+
+        Args:
+            caster: Rays against the mesh.
+            box_m: Lower and upper corner (2, 3) of the box, world, metres.
+            scene: Settings of the scene.
+            rng: Where samples come from.
+            clearance: Distance that cameras keep from surfaces; None if they need keep none.
+        """
         bounds = pose_bounds(box_m, scene.angles)
         return cls(
             caster=caster,

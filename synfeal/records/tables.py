@@ -275,7 +275,13 @@ def _value(cell: str, kind: Kind) -> object:
 
 
 def write_numbers(path: Path, header: str, rows: Iterable[Sequence[float | str]]) -> None:
-    """Write rows of Python numbers and names with enough digits to read back the same values."""
+    """Write rows of Python numbers and names with enough digits to read back the same values.
+
+    Args:
+        path: CSV file to write.
+        header: Its first line, columns separated by commas.
+        rows: Cells of each row.
+    """
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows(rows)
     with atomic_path(path) as temporary:
