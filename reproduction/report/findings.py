@@ -29,8 +29,8 @@ POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
 # What feature matching does without depth: points are where rays of two training frames meet.
 WITHOUT_DEPTH, ADJUSTED = "structure-rays", "structure-adjusted"
 SHAPES = {
-    "noise": "every frame has an error of its own",
-    "offset": "all frames of a path share one",
+    "noise": "every frame has its own error",
+    "offset": "all frames of a path share one error",
     "bend": "space is bent",
 }
 
@@ -146,10 +146,11 @@ def structure_beats_regression(root: Path) -> Finding | None:
     return Finding(
         f"On identical frames, matching image features is {_times(factor.value)} times as exact as"
         " regression.",
-        f"From {network.n_train:,} frames with exact poses and no depth, matched features give the"
-        f" pose of a test frame to {_cm(pair[0])} and {_deg(angles[0])}; the best of the five"
-        f" networks, {TITLES[network.model]}, to {_cm(pair[1])} and {_deg(angles[1])}.",
-        "labels and truth alike, for these labels are exact",
+        f"From {network.n_train:,} training frames with exact poses and no depth, matched features"
+        f" locate test frames with a median error of {_cm(pair[0])} and {_deg(angles[0])}. The best"
+        f" of the five networks, {TITLES[network.model]}, is off by {_cm(pair[1])} and"
+        f" {_deg(angles[1])}.",
+        "labels and truth alike, because these labels are exact",
         "references",
     )
 
@@ -168,10 +169,10 @@ def a_map_beats_exact_labels(root: Path) -> Finding | None:
         return None
     return Finding(
         "A map made from badly wrong poses beats regression trained on exact ones.",
-        f"Labels are {_noise(moved_by(root))} off. Bundle adjustment, which moves poses until the"
-        f" images agree, makes a map of them that finds test frames to {_cm(ours[0])} and"
-        f" {_deg(ours[1])};"
-        f" the best network, trained on exact labels, to {_cm(theirs[0])} and {_deg(theirs[1])}.",
+        f"The labels are {_noise(moved_by(root))} off. Bundle adjustment moves the poses until the"
+        f" images agree, and the resulting map locates test frames with a median error of"
+        f" {_cm(ours[0])} and {_deg(ours[1])}. The best network, trained on exact labels, is off by"
+        f" {_cm(theirs[0])} and {_deg(theirs[1])}.",
         "the truth",
         "references",
     )
@@ -207,11 +208,11 @@ def shared_errors_stay(root: Path) -> Finding | None:
         if path.low > own.high
         else "Label errors that bend space do more harm than errors that differ by frame."
     )
-    parts = [f"{_percent(changes[shape][1])} where {text}" for shape, text in SHAPES.items()]
+    parts = [f"{_percent(changes[shape][1])} if {text}" for shape, text in SHAPES.items()]
     return Finding(
         headline,
-        f"Labels that are {_noise(moved_by(root))} off raise the networks' orientation error by"
-        f" {', '.join(parts[:-1])}, and {parts[-1]} (mean over the five).",
+        f"Labels that are {_noise(moved_by(root))} off change the orientation error, averaged over"
+        f" the five networks, by {', '.join(parts[:-1])}, and {parts[-1]}.",
         "the truth",
         "table6_label_errors",
     )
@@ -254,10 +255,10 @@ def more_frames_help(root: Path) -> Finding | None:
         "More frames help, and part of that is longer training.",
         f"From {SMALL} to {LARGE} frames of the Large Room the position error changes by"
         f" {_percent(position)} and the orientation error by {_percent(orientation)}"
-        f" {_printed(few, many)}. But larger sets are also shown more images, and twice the images"
-        f" alone change the errors at {SMALL} by {_change(images_m.value)} and"
-        f" {_change(images_deg.value)}, which is {low} to {high} % of that effect. No {SMALL} run"
-        f" was shown as many images as the {LARGE} runs.",
+        f" {_printed(few, many)}. But runs on larger sets are also shown more images, and doubling"
+        f" the images alone changes the errors at {SMALL} by {_change(images_m.value)} and"
+        f" {_change(images_deg.value)}, which is {low} to {high} % of the effect of size. No"
+        f" {SMALL} run was shown as many images as the {LARGE} runs.",
         "labels and truth alike",
         "table4_size",
     )
@@ -289,7 +290,7 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
     if single is None or not all(change.holds(1.0) for change in shown):
         return None
     texts = [
-        f"{title} {' and '.join(_change(change.value) for change in both)}"
+        f"{' and '.join(_change(change.value) for change in both)} ({title})"
         for title, both in changes.items()
     ]
     sfm = cells[cells.labels == "sfm"]
@@ -300,13 +301,13 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
     posenet2 = (rows[rows.model == "posenet2"] for rows in (sfm, exact))
     errors_m = 100 * exact[POSITION]
     return Finding(
-        "Labels of SfM and RGB-D SLAM against exact ones: the difference is too small to see.",
-        f"These labels are off by a few centimetres (median {', '.join(doses)}), the networks by"
-        f" {errors_m.min():.0f} to {errors_m.max():.0f} cm: so small a dose cannot do much. Exact"
-        f" labels in their place change the position and orientation error, mean over the five, by"
-        f" {', '.join(texts)}. Against SfM's, {lower} of {2 * len(pairs)} errors are lower, so that"
-        f" a small gain is likely: PoseNet2's change by {_percent(single[0])} and"
-        f" {_percent(single[1])} {_printed(*posenet2)}.",
+        "Exact labels in place of those of SfM and RGB-D SLAM: the difference is too small to see.",
+        f"The estimated labels are off by a few centimetres (medians: {', '.join(doses)}), the"
+        f" networks by {errors_m.min():.0f} to {errors_m.max():.0f} cm, so these label errors can"
+        f" do little. Exact labels change the position and orientation errors, averaged over the"
+        f" five networks, by {', '.join(texts)}. With exact labels instead of SfM's, {lower} of"
+        f" {2 * len(pairs)} errors are lower, so a small gain is likely: those of PoseNet2 change"
+        f" by {_percent(single[0])} and {_percent(single[1])} {_printed(*posenet2)}.",
         "the truth",
         "table2_ground_truth",
     )
@@ -362,7 +363,8 @@ def sentences(root: Path, link: str = "") -> list[str]:
     items = []
     for found in findings(root):
         where = f" ([table]({link}/tables/{found.table}.csv))" if link else ""
-        items.append(f"**{found.headline}** {found.evidence} *Against {found.against}.*{where}")
+        measured = f"*Measured against {found.against}.*"
+        items.append(f"**{found.headline}** {found.evidence} {measured}{where}")
     return [*items, verdict_sentence(root)]
 
 
@@ -384,7 +386,7 @@ def _printed(before: pd.DataFrame, after: pd.DataFrame) -> str:
     for measure in ("position_m", "orientation_deg"):
         ratio = both[f"published_{measure}_new"] / both[f"published_{measure}_old"]
         texts.append(_change(float(np.exp(np.log(ratio).mean()))))
-    return f"(printed: {texts[0]} and {texts[1]})"
+    return f"(in the paper: {texts[0]} and {texts[1]})"
 
 
 def _cm(interval: Interval) -> str:

@@ -49,10 +49,11 @@ REAL_PAGE, REAL = Path("docs/real.md"), "real"
 FIGURE = Path("docs/images/findings.png")
 HEADLINES = ("night", "mini")
 LIMITS_NOTE = (
-    "In brackets: 95 % limits over test paths and training runs. Where [claims]({claims}) compare"
-    " the same errors frame by frame (the first change of the third finding, the fourth, and"
-    " PoseNet2 in the fifth) limits are theirs; other changes are treated as if both errors were"
-    " measured on different frames, which makes their limits wide."
+    "Brackets hold 95 % limits over test paths and training runs. Some changes are also judged"
+    " as [claims]({claims}), which compare errors frame by frame, and have their limits from there:"
+    " the first in the third finding, the effect of size in the fourth, and the changes of PoseNet2"
+    " in the fifth. Limits of other changes are computed as if the two errors had been measured on"
+    " different frames, which makes them wide."
 )
 PAPER_FRAMES = {"6k": 6000}
 SIFT = dict.fromkeys(
