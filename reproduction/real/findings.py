@@ -9,14 +9,21 @@ from typing import Any
 
 import pandas as pd
 
-from reproduction.real.design import GIVEN, PHOTOGRAPHS, RANDOMISED, RENDERED, SFM
+from reproduction.real.design import BOTH, GIVEN, PHOTOGRAPHS, RANDOMISED, RENDERED, SFM
 from reproduction.tables.columns import side_sheet
 from reproduction.tables.layouts import TITLES
-from reproduction.tables.real import DIRECTIONS, LOST, NAME, ROWS, read_real, side_table
+from reproduction.tables.real import DIRECTIONS, LOST, NAME, read_real, side_table
 from reproduction.tables.sheet import sheet_markdown
 from synfeal.records.tables import rows_of
 
 HEADLINE = "posenet2"
+# What localizers learn from and maps are built of, in sentences.
+SOURCES = {
+    RANDOMISED: "randomised renderings",
+    RENDERED: "renderings",
+    PHOTOGRAPHS: "photographs of the scan",
+    BOTH: "renderings and photographs of the scan",
+}
 
 
 def real_findings(root: Path) -> str:
@@ -60,9 +67,10 @@ def _direction(table: pd.DataFrame, direction: str) -> Iterator[str]:
         else "One seed."
     )
     yield (
-        f"{DIRECTIONS[direction]}: {TITLES[HEADLINE]} that has seen nothing but renderings of the"
-        f" scan is at {_pose(rendered)} on {rendered.n_test:,} photographs, the same network"
-        f" trained on the scan's photographs at {_pose(photographs)}: {times}. {seeds}"
+        f"{DIRECTIONS[direction]}: on {rendered.n_test:,} photographs, {TITLES[HEADLINE]} is off by"
+        f" {_pose(rendered)} when trained only on renderings of the scan, and by"
+        f" {_pose(photographs)} when trained on the scan's photographs. With renderings it is"
+        f" {times}. {seeds}"
     )
 
 
@@ -82,14 +90,14 @@ def _written(position_m: float, orientation_deg: float) -> str:
 
 def _localizers(table: pd.DataFrame) -> Iterator[str]:
     trained = table[table.method.isin(list(TITLES))]
-    for trained_on in (RANDOMISED, RENDERED, PHOTOGRAPHS, "both"):
+    for trained_on, source in SOURCES.items():
         rows = rows_of(trained[trained.trained_on == trained_on].sort_values("position_m"))
         if len(rows) < 2:
             continue
         best, worst = rows[0], rows[-1]
         yield (
-            f"Learned from {ROWS[trained_on]}: the {len(rows)} localizers are between"
-            f" {_pose(best)} ({TITLES[best.method]}) and {_pose(worst)} ({TITLES[worst.method]})."
+            f"Trained on {source}, the {len(rows)} localizers have errors from {_pose(best)}"
+            f" ({TITLES[best.method]}) to {_pose(worst)} ({TITLES[worst.method]})."
         )
 
 
@@ -97,7 +105,7 @@ def _structure(table: pd.DataFrame) -> Iterator[str]:
     for row in rows_of(table[table.method.isin(["structure", "structure-refined"])]):
         refined = ", refined on the scan" if row.method == "structure-refined" else ""
         yield (
-            f"Structure, map of {ROWS[row.trained_on]}{refined}: {_pose(row)},"
+            f"Structure, with a map of {SOURCES[row.trained_on]}{refined}: {_pose(row)},"
             f" {100 * row.recall_5cm_5deg:.0f} % within 5 cm and 5°,"
             f" {100 * row.localized:.0f} % localized."
         )
@@ -106,8 +114,9 @@ def _structure(table: pd.DataFrame) -> Iterator[str]:
     if mean is not None and all(floors):
         alike, nearest = floors
         yield (
-            f"To compare: the rendered frame that looks most alike {_pose(alike)}, the rendered"
-            f" pose that is nearest (an oracle) {_pose(nearest)}, the mean pose {_pose(mean)}."
+            f"For comparison: the rendered frame that looks most alike is off by {_pose(alike)},"
+            f" the nearest rendered pose (an oracle) by {_pose(nearest)}, the mean pose by"
+            f" {_pose(mean)}."
         )
 
 
@@ -120,10 +129,10 @@ def _labels(table: pd.DataFrame) -> Iterator[str]:
             continue
         name = TITLES.get(row.method, "structure")
         yield (
-            f"Whose labels, for {name}: with the whole chain on those by SfM the error is"
-            f" {_sfm(row)} against labels by SfM ({row.recall_5cm_5deg_sfm:.0%} within 5 cm and 5°)"
-            f" and {_pose(row)} against those of 7-Scenes; on those of 7-Scenes it is"
-            f" {_pose(given)} against them and {_sfm(given)} against those by SfM."
+            f"Source of the labels, {name}: with the whole chain on SfM's labels, the error is"
+            f" {_sfm(row)} against SfM's labels ({100 * row.recall_5cm_5deg_sfm:.0f} % within 5 cm"
+            f" and 5°) and {_pose(row)} against those of 7-Scenes. With the whole chain on those of"
+            f" 7-Scenes, it is {_pose(given)} against them and {_sfm(given)} against SfM's."
         )
 
 

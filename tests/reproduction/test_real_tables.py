@@ -68,13 +68,14 @@ def test_infinite_errors_and_missing_yardsticks_are_read_back(root):
 
 def test_sentences_give_the_numbers_of_their_rows(root):
     text = real_findings(root)
-    assert "at 0.120 m / 4.8° on 500 photographs" in text
-    assert "at 0.480 m / 19.2°: 4.0 times as exact (95 % limits 2.0 to 6.0)" in text
+    assert "on 500 photographs, PoseNet2 is off by 0.120 m / 4.8° when trained only on rend" in text
+    assert "by 0.480 m / 19.2° when trained on the scan's photographs" in text
+    assert "it is 4.0 times as exact (95 % limits 2.0 to 6.0)" in text
     assert "1.4 times as exact" in text
-    assert "between 0.120 m / 4.8° (PoseNet2) and 0.160 m / 6.4° (PoseNet)" in text
-    assert "Structure, map of rendered: half not localized, 25 % within 5 cm" in text
-    assert "Structure, map of rendered, refined on the scan: 0.050 m / 2.0°" in text
-    assert "the mean pose 0.620 m / 24.8°" in text
+    assert "errors from 0.120 m / 4.8° (PoseNet2) to 0.160 m / 6.4° (PoseNet)" in text
+    assert "Structure, with a map of renderings: half not localized, 25 % within 5 cm" in text
+    assert "Structure, with a map of renderings, refined on the scan: 0.050 m / 2.0°" in text
+    assert "the mean pose by 0.620 m / 24.8°" in text
 
 
 def test_the_table_is_the_same_on_page_on_paper_and_in_markdown(root):

@@ -211,7 +211,7 @@ def test_the_whole_chain_ends_in_a_table_figures_and_sentences(tmp_path):
     assert shares.mean() > 0.5
     for name in ("real_amount.png", "real_cover.svg"):
         assert (root / "figures" / name).stat().st_size > 1000
-    assert "PoseNet2 that has seen nothing but renderings" in real_findings(root)
+    assert "when trained only on renderings of the scan" in real_findings(root)
     assert "labels by SfM" in real_table(root)
     again = snakemake("--dry-run", "--configfile", str(tmp_path / "toy.yaml"))
     assert "Nothing to be done" in again.stdout + again.stderr
