@@ -109,8 +109,8 @@ class LightState:
 def drawn_light(config: LightConfig, rng: np.random.Generator) -> LightState:
     """Draw the light of one path."""
     ev = rng.uniform(*config.ev)
-    coldest, warmest = config.temperature_k
-    mired = rng.uniform(1e6 / warmest, 1e6 / coldest)
+    lowest_k, highest_k = config.temperature_k
+    mired = rng.uniform(1e6 / highest_k, 1e6 / lowest_k)
     ways = rng.standard_normal((WAVES, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     lengths_m = config.field_m * rng.uniform(1, 2, WAVES)

@@ -197,10 +197,10 @@ def _best_focal_px(sample: Sample, camera: CameraConfig) -> float:
 
 def _zoomed(camera: CameraConfig, factor: float) -> CameraConfig:
     fx, fy, _, _ = camera.intrinsics
-    return replace_intrinsics(camera, fx * factor, fy * factor)
+    return replace_focal_lengths(camera, fx * factor, fy * factor)
 
 
-def replace_intrinsics(camera: CameraConfig, fx: float, fy: float) -> CameraConfig:
+def replace_focal_lengths(camera: CameraConfig, fx: float, fy: float) -> CameraConfig:
     """Return the camera with other focal lengths, pixels."""
     _, _, cx, cy = camera.intrinsics
     return camera.model_copy(update={"fx": fx, "fy": fy, "cx": cx, "cy": cy})

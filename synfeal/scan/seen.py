@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.camera.distortion import distort
-from synfeal.camera.projection import Intrinsics
 from synfeal.config.dataset import CameraConfig
 from synfeal.geometry.poses import inverse
 from synfeal.scan.reading import Depth
@@ -74,18 +73,17 @@ def seen_points(
     return Seen(index[faces_us], local[faces_us], cosine[faces_us])
 
 
-def project(local_m: Floats, camera: CameraConfig, intrinsics: Intrinsics | None = None) -> Floats:
+def project(local_m: Floats, camera: CameraConfig) -> Floats:
     """Project points in front of a perspective camera.
 
     Args:
         local_m: Points (M, 3) in the frame of the camera, metres.
         camera: The camera.
-        intrinsics: Intrinsics in place of the camera's.
 
     Returns:
         Pixels (M, 2), column and row, inside the image or not.
     """
-    fx, fy, cx, cy = (np.float32(value) for value in intrinsics or camera.intrinsics)
+    fx, fy, cx, cy = (np.float32(value) for value in camera.intrinsics)
     normalised = local_m[:, :2] / local_m[:, 2:]
     if any(camera.distortion):
         normalised = distort(normalised.astype(np.float64), camera.distortion).astype(np.float32)
