@@ -35,7 +35,7 @@ from reproduction.real.scores import (
     times_as_exact,
 )
 from reproduction.tables.columns import write_side
-from reproduction.tables.real import AMOUNT, COVER, SCHEMA, side_table
+from reproduction.tables.real import AMOUNT, COVER, RUNS, SCHEMA, side_table
 from synfeal.records.files import read_json
 from synfeal.records.tables import NUMBER, frame_of, read_frame, write_frame
 
@@ -87,7 +87,12 @@ class Scored:
 
 
 def write_real_tables(
-    config: RealConfig, out_table: Path, out_tex: Path, out_amount: Path, out_cover: Path
+    config: RealConfig,
+    out_table: Path,
+    out_tex: Path,
+    out_runs: Path,
+    out_amount: Path,
+    out_cover: Path,
 ) -> None:
     """Score all poses and write the table, its LaTeX, and what the figures show.
 
@@ -95,6 +100,7 @@ def write_real_tables(
         config: The profile.
         out_table: A line for each direction, source of labels, training and localizer.
         out_tex: The table for a paper.
+        out_runs: Median errors of every training run by itself, against the sequence's own labels.
         out_amount: Errors against the number of rendered frames, and of photographs.
         out_cover: Errors against the share of a photograph that the scan covers.
     """
@@ -104,6 +110,7 @@ def write_real_tables(
     table = frame_of(rows, SCHEMA)
     write_frame(out_table, table)
     write_side(out_tex, side_table(table))
+    write_frame(out_runs, frame_of(_runs(config, design, scored), RUNS))
     write_frame(out_amount, frame_of(_amounts(config, design), AMOUNT))
     write_frame(out_cover, frame_of(_covers(config, design, scored), COVER))
 
@@ -128,6 +135,21 @@ def _rows(config: RealConfig, design: RealDesign, scored: Scored) -> Iterator[di
         found = scored.cell([f"{part.name}/references/{name}.csv"])
         trained_on = PHOTOGRAPHS if name == "mean" else "rendered"
         yield {**_labelled(config, part, trained_on, name), **found}
+
+
+def _runs(
+    config: RealConfig, design: RealDesign, scored: dict[Part, Scored]
+) -> Iterator[dict[str, Any]]:
+    """Yield the median errors of each training run, against the sequence's own labels."""
+    for run in design.runs:
+        (errors,) = scored[run.part].errors(_poses([run]))
+        keys = _labelled(config, run.part, run.row, run.localizer)
+        yield {
+            **{key: keys[key] for key in keys if key in RUNS},
+            "seed": run.seed,
+            "position_m": float(np.median(errors.position_m)),
+            "orientation_deg": float(np.median(errors.orientation_deg)),
+        }
 
 
 def _labelled(config: RealConfig, part: Part, row: str, method: str) -> dict[str, Any]:

@@ -40,6 +40,11 @@ SCHEMA = {
 }
 _POSE = {f"{name}{end}": LIMITLESS for name in MEASURES[:2] for end in _ENDS}
 AMOUNT = {"kind": TEXT, "trained_on": TEXT, "amount": COUNT, "n_seeds": COUNT, **_POSE}
+RUNS = {
+    **dict.fromkeys(("direction", "labels", "trained_on", "method"), TEXT),
+    "seed": COUNT,
+    **dict.fromkeys(MEASURES[:2], LIMITLESS),
+}
 COVER = {
     **dict.fromkeys(("direction", "trained_on"), TEXT),
     **dict.fromkeys(("share_low", "share_high", "share"), NUMBER),

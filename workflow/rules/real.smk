@@ -350,6 +350,7 @@ rule real_tables:
     output:
         table=f"{ROOT}/tables/table8_real.csv",
         tex=f"{ROOT}/tables/table8_real.tex",
+        runs=f"{ROOT}/tables/real_runs.csv",
         amount=f"{ROOT}/tables/real_amount.csv",
         cover=f"{ROOT}/tables/real_cover.csv",
     log:

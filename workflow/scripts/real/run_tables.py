@@ -9,6 +9,7 @@ run_job(
     config=snakemake.params.config,
     out_table=snakemake.output.table,
     out_tex=snakemake.output.tex,
+    out_runs=snakemake.output.runs,
     out_amount=snakemake.output.amount,
     out_cover=snakemake.output.cover,
 )
