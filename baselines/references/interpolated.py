@@ -70,7 +70,9 @@ def affine_weights(retrieved: Vectors, query: Vectors) -> Array:
     # |w @ off|^2, whose solution is the inverse of its matrix times ones, scaled to sum 1.
     gram = off @ off.transpose(0, 2, 1)
     count = gram.shape[1]
-    ridge = RIDGE * np.trace(gram, axis1=1, axis2=2) / count + np.finfo(float).tiny
+    trace = np.trace(gram, axis1=1, axis2=2)
+    # Where all retrieved descriptors are the query's, every combination is as good: equal weights.
+    ridge = np.where(trace > np.finfo(float).tiny, RIDGE * trace / count, 1.0)
     gram += ridge[:, None, None] * np.eye(count)
     weights = np.linalg.solve(gram, np.ones((len(gram), count, 1)))[..., 0]
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))

@@ -261,6 +261,13 @@ def test_what_is_prepared_is_not_part_of_answers():
     assert evidence.spent["prepare_s"] >= 0.04
 
 
+@pytest.mark.parametrize("count", [1, 4, 20])
+def test_images_that_are_the_query_itself_weigh_alike(count):
+    descriptors = np.tile(np.random.default_rng(0).normal(size=(1, 1, 8)), (1, count, 1))
+    weights = affine_weights(descriptors, descriptors[:, 0])
+    np.testing.assert_allclose(weights, np.full((1, count), 1 / count), rtol=1e-12)
+
+
 def test_interpolated_poses_lie_where_the_descriptor_does():
     """A query at three quarters of the way between two descriptors, with six others about."""
     rng = np.random.default_rng(0)
