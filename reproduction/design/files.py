@@ -105,11 +105,15 @@ class Files:
             split: ``train`` or ``test``.
 
         Returns:
-            Frames of the largest size that needs them; 0 where none does.
+            Frames of the largest size that needs them; 0 where none does. Scenes that no row of the
+            design is of have all their frames rendered with ``network``.
         """
         if camera == "network":
-            return self.config.n_largest(scene, split)
-        sizes = {size for labelled, size, _ in self.design.estimated if labelled == scene}
+            sizes = {size for of, size in self.sizes if of == scene}
+            if not sizes:
+                return self.config.n_largest(scene, split)
+        else:
+            sizes = {size for labelled, size, _ in self.design.estimated if labelled == scene}
         return max((self.config.n_frames(scene, size, split) for size in sizes), default=0)
 
     def sequences(self, scene: str, camera: str) -> list[Sequence]:

@@ -71,10 +71,10 @@ def _size(files: Files, rule: str, job: Mapping[str, str]) -> tuple[float, str, 
         **dict.fromkeys(("render", "rgbd", "estimate", "features", "views"), large_px),
         "sfm": config.groundtruth.sfm.max_features,
     }
-    return float(_frames(files, job)), "frames", float(px.get(rule, 1))
+    return float(_frames(files, rule, job)), "frames", float(px.get(rule, 1))
 
 
-def _frames(files: Files, job: Mapping[str, str]) -> int:
+def _frames(files: Files, rule: str, job: Mapping[str, str]) -> int:
     """Count the frames of a job's batch, sequence, size or scene, or those of all tests."""
     config = files.config
     splits = [job["split"]] if "split" in job else list(SPLITS)
@@ -84,6 +84,8 @@ def _frames(files: Files, job: Mapping[str, str]) -> int:
         return len(files.sequence(job["scene"], job.get("camera", "network"), job["sequence"]))
     if "size" in job:
         return sum(config.n_frames(job["scene"], job["size"], split) for split in splits)
-    if "scene" in job:
+    if rule == "plan":  # of all sizes: what it costs is no reason to have another plan
         return sum(config.n_largest(job["scene"], split) for split in splits)
+    if "scene" in job:
+        return sum(files.n_frames(job["scene"], "network", split) for split in splits)
     return sum(config.n_frames(run.scene, run.size, "test") for run in files.design.runs)

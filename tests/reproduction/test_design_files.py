@@ -50,6 +50,15 @@ def test_an_estimated_row_adds_its_batches_and_large_frames():
     assert len(jobs["train"]) == 10
 
 
+@pytest.mark.parametrize(("sizes", "frames"), [(["6k"], 60), (["6k", "40k"], 400), (["20k"], 200)])
+def test_no_frame_is_drawn_that_no_row_is_learned_from(sizes, frames):
+    """The smoke profile has a hundredth of the paper's frames."""
+    files = files_of(*({**ROW, "size": size} for size in sizes))
+    assert files.n_frames("large_room", "network", "train") == frames
+    drawn = [s for s in files.sequences("large_room", "network") if s.split == "train"]
+    assert sum(len(sequence) for sequence in drawn) == frames
+
+
 @pytest.mark.parametrize("labels", ["rgbd-toro", "rgbd-g2o"])
 def test_pose_graphs_are_built_once_and_solved_by_each_method(labels):
     row = {**ROW, "table": "table2_ground_truth", "labels": labels}
