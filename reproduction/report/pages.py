@@ -24,6 +24,7 @@ from reproduction.claims.table import claims_markdown
 from reproduction.real.findings import real_findings, real_table
 from reproduction.report.findings import can_tell, read_table, sentences, verdict_sentence
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
+from reproduction.report.fresh import fresh_claims, fresh_sentence
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
 from reproduction.runs.results import read_result
@@ -163,6 +164,9 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "labels": labels_table,
     "assistance": assistance,
     "claims": claims,
+    # Of all published runs together, whatever profile the mark names.
+    "fresh": lambda root: fresh_claims(root.parent),
+    "tested": lambda root: fresh_sentence(root.parent),
     "difficulty": lambda root: difficulty(),
     "real": real_findings,
     "photographs": real_table,

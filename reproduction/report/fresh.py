@@ -1,0 +1,187 @@
+"""Claims that were judged with fresh seeds, and what it would take to judge the others.
+
+The rules of the verdicts were changed after results had been seen, and are frozen since
+(``docs/rules.md``). So only runs whose seeds no earlier run has used can test a claim. Runs of one
+purpose test some of the claims each; this module collects their verdicts, and lists for every other
+claim the run that would decide it, with the processor time that is planned for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+
+from reproduction.claims.rules import frozen_rules
+from reproduction.claims.verdicts import Claim, Verdict, published_claims
+from reproduction.report.publish import PUBLISHED, RESULTS
+from reproduction.report.published_claims import read_published, rules_of
+from reproduction.runs.results import read_result
+from reproduction.tables.sheet import markdown_table
+from synfeal.errors import InputError
+from synfeal.records.tables import MAYBE, TEXT, read_frame
+
+# All runs that were published before the rules were frozen, or that chose a setting, had this seed.
+SEEN_SEED = "0"
+# No chance enters the claims about the set-up, and C9 is not judged (docs/rules.md).
+NOT_DRAWN = ("C9",)
+# Verdicts that leave a claim open.
+OPEN = (Verdict.UNDECIDED, Verdict.NOT_TESTABLE, Verdict.NOT_LEARNT)
+
+
+class JudgingRun(NamedTuple):
+    """A run that judges claims.
+
+    Attributes:
+        profile: Name of its profile, ``config/<profile>.yaml``.
+        claims: Claims it has the rows for.
+        plan: Row of ``results/benchmarks/plan_<profile>.csv`` with its cost.
+    """
+
+    profile: str
+    claims: tuple[str, ...]
+    plan: str = "total"
+
+
+RUNS = (
+    JudgingRun("labels", ("C1", "C2", "C3", "C4", "C6", "C15")),
+    JudgingRun("dose", ("C5", "C6")),
+    JudgingRun("controls", ("C7", "C8", "C10", "C11", "C12")),
+    JudgingRun("night", ("C13",), "table7_images_shown"),
+)
+
+
+class Judged(NamedTuple):
+    """A claim with the verdict of a run with a fresh seed.
+
+    Attributes:
+        claim: The claim.
+        profile: Name of the run.
+        row: Its row of ``claims.csv``.
+    """
+
+    claim: Claim
+    profile: str
+    row: Mapping[str, str]
+
+    @property
+    def verdict(self) -> str:
+        """Return the verdicts against the labels and against the truth, or the one they share."""
+        both = self.row["verdict_labels"], self.row["verdict_true"]
+        return " / ".join(dict.fromkeys(both))
+
+    @property
+    def decided(self) -> bool:
+        """Tell whether the errors against the truth decide the claim."""
+        return self.row["verdict_true"] not in OPEN
+
+
+def claims_to_test() -> list[Claim]:
+    """List the claims that seeds can decide: those about localization and about labels."""
+    claims = [claim for claim in published_claims() if claim.id not in NOT_DRAWN]
+    return [claim for claim in claims if claim.group != "set-up"]
+
+
+def is_fresh(rows: Sequence[Mapping[str, str]]) -> bool:
+    """Tell whether verdicts were made by the frozen rules, from a seed not used before them."""
+    return rules_of(rows) == frozen_rules().tag and rows[0].get("seed") != SEEN_SEED
+
+
+def judged_fresh(published: Path = PUBLISHED) -> list[Judged]:
+    """List the claims judged with fresh seeds, in their order.
+
+    Where two runs judge a claim, the one stands that decides it, else the first by name.
+
+    Args:
+        published: Folder of the published runs.
+    """
+    found: dict[str, list[Judged]] = {claim.id: [] for claim in claims_to_test()}
+    claims = {claim.id: claim for claim in claims_to_test()}
+    for root in sorted(path.parent for path in published.glob("*/claims.csv")):
+        rows = read_published(root)
+        if is_fresh(rows):
+            for row in rows:
+                if row["id"] in claims and row["verdict_true"] != Verdict.NOT_TESTABLE:
+                    found[row["id"]].append(Judged(claims[row["id"]], root.name, row))
+    return [max(own, key=lambda judged: judged.decided) for own in found.values() if own]
+
+
+def fresh_claims(published: Path = PUBLISHED) -> str:
+    """Tabulate the claims judged with fresh seeds, and list what would decide the others."""
+    judged = judged_fresh(published)
+    rows = [
+        {
+            "": found.claim.id,
+            "Claim": found.claim.statement,
+            "Published": found.claim.published,
+            "Against the true poses": found.row["measured_true"].split("; sign tests")[0],
+            "95 % limits": found.row["interval_true"] or "–",
+            "Verdict": f"**{found.verdict}**",
+            "Run": f"`{found.profile}`",
+        }
+        for found in judged
+    ]
+    parts = [fresh_sentence(published), markdown_table(pd.DataFrame(rows)) if rows else ""]
+    parts += [_runs(published, judged), _open(judged)]
+    return "\n\n".join(part for part in parts if part)
+
+
+def fresh_sentence(published: Path = PUBLISHED) -> str:
+    """Say how many claims were judged with fresh seeds, and how they fared."""
+    judged, asked = judged_fresh(published), claims_to_test()
+    if not judged:
+        return "No claim has been judged with fresh seeds yet."
+    verdicts = [f"{found.claim.id} {found.verdict}" for found in judged]
+    decided = sum(found.decided for found in judged)
+    return (
+        f"**With fresh seeds**, by rules that were frozen before, {len(judged)} of the"
+        f" {len(asked)} claims about localization and labels have been judged so far, and"
+        f" {decided} of them decided: {', '.join(verdicts)}. (Two verdicts are against the labels /"
+        " against the true poses.)"
+    )
+
+
+def _runs(published: Path, judged: Sequence[Judged]) -> str:
+    """Name the runs: commit, seed, training runs per cell."""
+    texts = []
+    for profile in dict.fromkeys(found.profile for found in judged):
+        record = read_result(published / profile / "provenance.json", ("commit",), "publish again")
+        row = next(found.row for found in judged if found.profile == profile)
+        texts.append(f"`{profile}`: seed {row['seed']}, commit `{record['commit'][:9]}`")
+    return f"Runs: {'; '.join(texts)}." if texts else ""
+
+
+def _open(judged: Sequence[Judged]) -> str:
+    """List the claims that no fresh seed has decided, by the run that would."""
+    decided = {found.claim.id for found in judged if found.decided}
+    items = []
+    for run in RUNS:
+        left = [claim for claim in run.claims if claim not in decided]
+        if left and not _was_run(run, judged):
+            items.append(
+                f"- {', '.join(left)}: profile `{run.profile}`"
+                f"{'' if run.plan == 'total' else f', table `{run.plan}`, with another seed'},"
+                f" planned at {planned_hours(run):.1f} hours of processor time"
+                f" ([plan](../results/benchmarks/plan_{run.profile}.csv))."
+            )
+    return "\n".join(["What would decide the others:", "", *items]) if items else ""
+
+
+def _was_run(run: JudgingRun, judged: Sequence[Judged]) -> bool:
+    return any(found.profile == run.profile for found in judged)
+
+
+def planned_hours(run: JudgingRun, folder: Path = RESULTS / "benchmarks") -> float:
+    """Return the hours of processor time that a run is planned at.
+
+    Raises:
+        InputError: It has not been planned.
+    """
+    path = folder / f"plan_{run.profile}.csv"
+    costs = read_frame(path, {"name": TEXT, "cpu_s": MAYBE}, "make plan")
+    own = costs[costs.name == run.plan]
+    if own.empty:
+        raise InputError(f"{path}: has no row '{run.plan}'; make plan")
+    return float(own.cpu_s.iloc[0]) / 3600

@@ -1,0 +1,121 @@
+"""Claims judged with fresh seeds: which count, which verdict stands, what would decide the rest."""
+
+import csv
+import shutil
+from pathlib import Path
+
+import pytest
+
+from reproduction.claims.rules import rules_history
+from reproduction.claims.verdicts import Verdict
+from reproduction.config.load import load_config
+from reproduction.design.experiments import read_design
+from reproduction.report.fresh import (
+    RUNS,
+    claims_to_test,
+    fresh_claims,
+    fresh_sentence,
+    judged_fresh,
+    planned_hours,
+)
+from reproduction.report.publish import PUBLISHED
+from synfeal.errors import InputError
+from tests import CONFIG
+
+REPOSITORY = Path(__file__).parents[2]
+MINI = REPOSITORY / "results/published/mini"
+BENCHMARKS = REPOSITORY / "results/benchmarks"
+
+
+def publish_copy(folder, name, changes=(), **common):
+    """Copy the published mini under another name, with other cells in its claims.csv.
+
+    ``changes`` are triples of claim, column and value; ``common`` holds columns of all rows.
+    """
+    shutil.copytree(MINI, folder / name, ignore=shutil.ignore_patterns("tables"))
+    path = folder / name / "claims.csv"
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        row.update(common)
+        row.update({column: value for claim, column, value in changes if claim == row["id"]})
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def test_seeds_that_were_seen_and_rules_that_were_replaced_do_not_count(tmp_path):
+    publish_copy(tmp_path, "seen", seed="0")
+    publish_copy(tmp_path, "replaced", seed="7", rules=rules_history()[0].tag)
+    assert judged_fresh(tmp_path) == []
+    assert "No claim" in fresh_sentence(tmp_path)
+    publish_copy(tmp_path, "fresh", seed="7")
+    assert {found.profile for found in judged_fresh(tmp_path)} == {"fresh"}
+
+
+def test_claims_without_chance_are_left_out(tmp_path):
+    publish_copy(tmp_path, "fresh", seed="7")
+    names = {found.claim.id for found in judged_fresh(tmp_path)}
+    assert names
+    assert not names & {"C9", "C14", "C16"}
+    assert len(claims_to_test()) == 13
+
+
+def test_of_two_runs_the_one_that_decides_a_claim_stands(tmp_path):
+    undecided, holds = str(Verdict.UNDECIDED), str(Verdict.HOLDS)
+    publish_copy(tmp_path, "a", [("C2", "verdict_true", undecided)], seed="1")
+    publish_copy(tmp_path, "b", [("C2", "verdict_true", holds)], seed="2")
+    publish_copy(tmp_path, "c", [("C2", "verdict_true", str(Verdict.NOT_TESTABLE))], seed="3")
+    (found,) = (found for found in judged_fresh(tmp_path) if found.claim.id == "C2")
+    assert (found.profile, found.decided) == ("b", True)
+
+
+def test_a_page_names_run_seed_verdicts_and_what_is_open(tmp_path, monkeypatch):
+    monkeypatch.chdir(REPOSITORY)
+    every = [(c.id, "verdict_true", str(Verdict.HOLDS)) for c in claims_to_test()]
+    labels = [change for change in every if change[0] in RUNS[0].claims]
+    others = [(c.id, "verdict_true", str(Verdict.NOT_TESTABLE)) for c in claims_to_test()]
+    publish_copy(tmp_path, "labels", [*others, *labels], seed="41")
+    text = fresh_claims(tmp_path)
+    assert "seed 41" in text
+    assert f"{len(labels)} of them decided" in text
+    left = text.split("What would decide the others")[1]
+    assert "C7" in left
+    assert "`controls`" in left
+    assert "`labels`" not in left
+    publish_copy(tmp_path, "rest", every, seed="42")
+    assert "What would decide" not in fresh_claims(tmp_path)
+
+
+def test_each_open_claim_has_a_run_with_the_tables_it_is_judged_by():
+    needed = {
+        "C1": "table2_ground_truth",
+        "C5": "table3_inconsistencies",
+        "C6": "table3_inconsistencies",
+        "C7": "table4_size",
+        "C10": "table5_from_scratch",
+        "C13": "table7_images_shown",
+    }
+    assert {claim for run in RUNS for claim in run.claims} == {c.id for c in claims_to_test()}
+    for run in RUNS:
+        config = load_config(CONFIG / "config.yaml", CONFIG / f"{run.profile}.yaml")
+        tables = read_design(config).tables
+        assert {needed[claim] for claim in run.claims if claim in needed} <= {*tables}
+
+
+def test_hours_are_those_of_the_tracked_plans(tmp_path):
+    with (BENCHMARKS / "plan_controls.csv").open(newline="") as file:
+        total = next(row for row in csv.DictReader(file) if row["name"] == "total")
+    (controls,) = (run for run in RUNS if run.profile == "controls")
+    assert planned_hours(controls, BENCHMARKS) == pytest.approx(float(total["cpu_s"]) / 3600)
+    with pytest.raises(InputError, match="plan_controls"):
+        planned_hours(controls, tmp_path)
+    (tmp_path / "plan_controls.csv").write_text("name,cpu_s\nscene,1\n")
+    with pytest.raises(InputError, match="make plan"):
+        planned_hours(controls, tmp_path)
+
+
+def test_published_runs_are_read_where_pages_are_made(monkeypatch):
+    monkeypatch.chdir(REPOSITORY)
+    assert fresh_claims(PUBLISHED)
