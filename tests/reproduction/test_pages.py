@@ -94,7 +94,8 @@ def test_the_headline_is_of_the_largest_profile_published(root):
 
 
 def test_unknown_parts_and_unpublished_results_are_input_errors(root):
-    for name in set(PARTS) - {"difficulty"}:
+    of_no_profile = {"difficulty", "fresh", "tested"}
+    for name in set(PARTS) - of_no_profile:
         with pytest.raises(InputError, match="results/published/paper"):
             part_of(name, "paper")
     with pytest.raises(InputError, match="<!-- sizes mini -->: no such part"):
