@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import sys
@@ -45,7 +46,23 @@ def job(log: str | Path) -> Iterator[None]:
         os.close(real_stderr)
 
 
-def run_job(log: str, function: Callable[..., None], /, **arguments: object) -> None:
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Import what is named inside without looking for garbage, of which imports make none.
+
+    Importing torch makes a quarter of a million objects. Looking through them, again and again
+    while there are more of them and once more at the end of the process, takes half as long as
+    making them.
+    """
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
+def run_job(log: str, function: Callable[..., object], /, **arguments: object) -> None:
     """Call the function of a rule inside :func:`job`.
 
     Args:
@@ -54,6 +71,7 @@ def run_job(log: str, function: Callable[..., None], /, **arguments: object) -> 
         arguments: Its arguments as Snakemake has them: texts become paths, numbers and
             configuration models as the function annotates them.
     """
+    gc.freeze()  # what is imported stays, and is not looked through for garbage, nor at the exit
     with job(log):
         validate_call(function)(**arguments)
 

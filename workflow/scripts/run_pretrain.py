@@ -1,7 +1,9 @@
 """Write the state dict that ``init: pretrained`` starts from."""
 
-from baselines.training.pretrain import pretrain_backbone
-from reproduction.runs.job import run_job
+from reproduction.runs.job import run_job, uncollected
+
+with uncollected():
+    from baselines.training.pretrain import pretrain_backbone
 
 run_job(
     snakemake.log[0],

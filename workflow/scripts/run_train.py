@@ -1,7 +1,9 @@
 """Train a localizer, predict its test frames, and score the predictions."""
 
-from baselines.training.experiment import train_and_score
-from reproduction.runs.job import run_job
+from reproduction.runs.job import run_job, uncollected
+
+with uncollected():
+    from baselines.training.experiment import train_and_score
 
 run_job(
     snakemake.log[0],

@@ -1,7 +1,9 @@
 """Train a localizer, and predict the test frames it is scored on."""
 
-from baselines.training.run import train_and_predict
-from reproduction.runs.job import run_job
+from reproduction.runs.job import run_job, uncollected
+
+with uncollected():
+    from baselines.training.run import train_and_predict
 
 run_job(
     snakemake.log[0],
