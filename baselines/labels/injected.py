@@ -270,16 +270,3 @@ def write_erroneous_labels(
         rng=np.random.default_rng(seed),
     )
     write_pose_table(out_labels, erroneous)
-
-
-def constant_pose(train: PoseTable, frames: PoseTable) -> PoseTable:
-    """Answer every frame with one pose: mean position and mean rotation of a label set.
-
-    The mean rotation is the one with the least sum of squared chords (Markley et al., "Averaging
-    Quaternions", JGCD 2007). Cameras that look all round have hardly a mean; then any rotation does
-    about as well. The poses of the frames are not looked at.
-    """
-    mean = Rotation.from_quat(train.quat_wxyz, scalar_first=True).mean()
-    quat_wxyz = canonical_quat_wxyz(mean.as_quat(scalar_first=True))
-    position_m = np.tile(train.position_m.mean(axis=0), (len(frames), 1))
-    return PoseTable(frames.frame, frames.path, position_m, np.tile(quat_wxyz, (len(frames), 1)))

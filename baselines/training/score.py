@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from baselines.labels.injected import constant_pose
+from baselines.labels.constant import constant_pose
 from baselines.training.record import check_same_labels
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import HEADER, PoseTable, read_pose_table, whole_numbers

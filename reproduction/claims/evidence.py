@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.labels.injected import constant_pose
+from baselines.labels.constant import constant_pose
 from reproduction.claims.verdicts import Missing
 from reproduction.design.experiments import Design, Run, common_every
 from reproduction.statistics.limits import COLUMNS, COMMON_COLUMNS, MEASURES, REMEDY, read_errors

@@ -19,6 +19,7 @@ from synfeal.geometry.poses import (
 from synfeal.geometry.rotations import (
     canonical_quat_wxyz,
     matrix_from_quat_wxyz,
+    mean_quat_wxyz,
     quat_wxyz_from_matrix,
     rotation_angle_rad,
     rotation_from_rpy,
@@ -113,6 +114,24 @@ def test_quaternions_and_matrices_are_the_same_rotations(quat, length):
     found = quat_wxyz_from_matrix(matrix)
     assert found[0] >= 0
     same_rotation(found, quat)
+
+
+def test_matrices_and_means_are_scipys():
+    rng = np.random.default_rng(0)
+    for size in (1e-150, 1.0, 1e150):
+        quat = size * rng.normal(size=(20, 30, 4))
+        matrix = Rotation.from_quat(quat.reshape(-1, 4), scalar_first=True).as_matrix()
+        found = matrix_from_quat_wxyz(quat)
+        np.testing.assert_allclose(found, matrix.reshape(20, 30, 3, 3), rtol=0, atol=5e-16)
+    for count in (1, 2, 7, 100, 3001):
+        quat = canonical_quat_wxyz([1.0, 0.2, -0.3, 0.4] + 0.3 * rng.normal(size=(count, 4)))
+        mean = Rotation.from_quat(quat, scalar_first=True).mean().as_quat(scalar_first=True)
+        same_rotation(mean_quat_wxyz(quat), mean)
+
+
+def test_a_quaternion_of_zeros_is_no_rotation():
+    with pytest.raises(ValueError, match="length 0"):
+        matrix_from_quat_wxyz(np.zeros((2, 4)))
 
 
 @few
