@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from baselines.labels.constant import constant_pose
@@ -19,7 +18,7 @@ from synfeal.errors import InputError
 from synfeal.evaluation.metrics import finite, pose_errors, summary
 from synfeal.evaluation.reprojection import dcre, dcre_summary, read_cell_depth
 from synfeal.records.files import write_json
-from synfeal.records.tables import read_numbers, write_frame
+from synfeal.records.tables import read_numbers, write_columns
 
 Array = NDArray[np.float64]
 
@@ -124,8 +123,7 @@ def score_run(
         for end, reference in {"": label_table, "_true": true_table}.items():
             found = dcre(predicted, reference, depth_m, depth[1])
             metrics |= dcre_summary(found, predicted.path, end)
-    table = pd.DataFrame({"frame": predicted.frame, **errors})
-    write_frame(out_errors, table, float_format=None, na_rep="nan")
+    write_columns(out_errors, {"frame": predicted.frame, **errors})
     write_json(out_metrics, metrics)
 
 
@@ -144,8 +142,7 @@ def score_common(predictions: Path, truth: Path, out: Path) -> None:
     poses = whole.at(np.flatnonzero(np.isin(whole.frame, predicted.frame)))
     if not np.array_equal(poses.frame, predicted.frame):
         raise InputError(f"{predictions}: has frames that {truth} does not have; predict again")
-    table = pd.DataFrame({"frame": predicted.frame, **pose_errors(predicted, poses)})
-    write_frame(out, table, float_format=None, na_rep="nan")
+    write_columns(out, {"frame": predicted.frame, **pose_errors(predicted, poses)})
 
 
 def _both_scores(poses: PoseTable, labels: PoseTable, truth: PoseTable) -> dict[str, Array]:

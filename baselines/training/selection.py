@@ -8,7 +8,6 @@ import time
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import pandas as pd
 import torch
 from torch import Tensor, nn
 
@@ -16,7 +15,7 @@ from baselines.localizers.base import Localizer
 from baselines.localizers.losses import PosePrediction, quat_chords
 from baselines.training.data import ImageStatistics, LabelledFrames
 from baselines.training.device import Precision, autocast
-from synfeal.records.tables import write_frame
+from synfeal.records.tables import write_numbers
 
 log = logging.getLogger(__name__)
 
@@ -265,4 +264,5 @@ def kept_errors(rows: list[HistoryRow]) -> HeldOutErrors | None:
 
 def write_history(path: Path, rows: list[HistoryRow]) -> None:
     """Write the history as CSV, a column per field; empty: not looked at, or no number."""
-    write_frame(path, pd.DataFrame(rows, columns=HistoryRow._fields), float_format=None)
+    cells = [["" if value is None or math.isnan(value) else value for value in row] for row in rows]
+    write_numbers(path, ",".join(HistoryRow._fields), cells)

@@ -288,6 +288,17 @@ def write_numbers(path: Path, header: str, rows: Iterable[Sequence[float | str]]
         temporary.write_text(f"{header}\n{text.getvalue()}", encoding="utf-8")
 
 
+def write_columns(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
+    """Write numbers (N,) by name, with enough digits to read back the same values.
+
+    Args:
+        path: CSV file to write.
+        columns: Its columns; what is not a number is written as ``nan``.
+    """
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    write_numbers(path, ",".join(columns), rows)
+
+
 def read_numbers(
     path: Path,
     header: str,

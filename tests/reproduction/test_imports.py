@@ -3,6 +3,7 @@
 Hundreds of jobs are processes of a few seconds, and large libraries take a second to import.
 """
 
+import gc
 import json
 import os
 import subprocess
@@ -11,16 +12,19 @@ from pathlib import Path
 
 import pytest
 
+from reproduction.runs.job import uncollected
+
 ROOT = Path(__file__).parents[2]
 # Functions of rules, and the modules that their jobs do without.
 BUDGETS = {
     "baselines.training.score:write_scores": [
         "torch",
         "matplotlib",
+        "pandas",
         "trimesh",
         "open3d",
         "networkx",
-        "scipy.optimize",
+        "scipy",
         "sympy",
     ],
     "baselines.training.experiment:train_and_score": [
@@ -28,10 +32,11 @@ BUDGETS = {
         "torch._inductor",
         "sympy",
         "matplotlib",
+        "pandas",
         "trimesh",
         "open3d",
         "networkx",
-        "scipy.optimize",
+        "scipy",
     ],
     "synfeal.dataset.render_sequence:render_packed": [
         "torch",
@@ -40,7 +45,13 @@ BUDGETS = {
         "sympy",
     ],
     "synfeal.dataset.packed:write_packed": ["torch", "matplotlib", "pandas", "trimesh", "scipy"],
-    "synfeal.dataset.pose_table:write_first_frames": ["torch", "matplotlib", "pandas", "trimesh"],
+    "synfeal.dataset.pose_table:write_first_frames": [
+        "torch",
+        "matplotlib",
+        "pandas",
+        "trimesh",
+        "scipy",
+    ],
     "synfeal.planning.plan:write_plan": ["torch", "matplotlib", "pandas"],
 }
 OPTIMISERS = """
@@ -77,3 +88,24 @@ def test_training_steps_do_not_import_torchs_compiler():
     imported = modules_after(OPTIMISERS)
     assert "torch" in imported
     assert not imported & {"torch._dynamo", "torch._inductor", "sympy"}
+
+
+def test_imports_are_not_looked_through_for_garbage_then_or_later():
+    made, kept = [], gc.get_freeze_count()
+    try:
+        with uncollected():
+            assert not gc.isenabled()
+            made = [[] for _ in range(1000)]
+        assert gc.isenabled()
+        assert gc.get_freeze_count() >= kept + len(made)
+        with pytest.raises(ImportError), uncollected():
+            import absent_module  # noqa: F401
+        assert gc.isenabled()
+    finally:
+        gc.unfreeze()
+
+
+@pytest.mark.parametrize("script", ["run_pretrain", "run_train", "run_train_varied"])
+def test_scripts_that_import_torch_collect_no_garbage_meanwhile(script):
+    text = (ROOT / f"workflow/scripts/{script}.py").read_text()
+    assert "with uncollected():\n    from baselines.training" in text
