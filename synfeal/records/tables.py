@@ -126,8 +126,8 @@ class Cells:
 
     path: Path
     header: tuple[str, ...]
-    lines: tuple[int, ...]
-    rows: tuple[list[str], ...]
+    lines: Sequence[int]
+    rows: Sequence[list[str]]
     remedy: str
 
     def check_rows(self) -> None:
@@ -159,7 +159,9 @@ class Cells:
         """
         places = [self.header.index(name) for name in names]
         empty = "nan" if may_be_empty else ""
-        cells = [[row[place] or empty for place in places] for row in self.rows]
+        cells = self.rows
+        if may_be_empty or places != list(range(len(self.header))):
+            cells = [[row[place] or empty for place in places] for row in self.rows]
         try:
             return np.array(cells, np.float64).reshape(len(cells), len(places))
         except ValueError as error:
@@ -203,11 +205,15 @@ def parse_cells(
         InputError: A quoted cell does not end, or has more text after its end.
     """
     reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=sep)
+    lines: list[int] = []
+    rows: list[list[str]] = []
     with read_as(path, what, csv.Error, remedy=f"; {remedy}"):
         header = next(reader, [])
-        rows = [(reader.line_num, row) for row in reader if row or not skip_blank]
-    lines, cells = zip(*rows, strict=True) if rows else ((), ())
-    return Cells(path, tuple(header), lines, cells, remedy)
+        for row in reader:
+            if row or not skip_blank:
+                lines.append(reader.line_num)
+                rows.append(row)
+    return Cells(path, tuple(header), lines, rows, remedy)
 
 
 def frame_of(records: Iterable[Mapping[str, Any]], schema: Schema) -> pd.DataFrame:
