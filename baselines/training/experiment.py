@@ -1,7 +1,7 @@
 """A training run of the workflow: train, predict, and score in one process.
 
 A process that scores one run and nothing else spends its time on imports. So scores are written
-where predictions are made; those of an archive's predictions are written by
+where predictions are made, of the poses in memory; those of an archive's predictions are written by
 :func:`baselines.training.score.write_scores` alone.
 """
 
@@ -14,9 +14,9 @@ import numpy as np
 
 from baselines.config.learning import ModelName
 from baselines.training.run import train_and_predict
-from baselines.training.score import write_scores
+from baselines.training.score import score_common_poses, score_poses
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 from synfeal.evaluation.reprojection import read_cell_depth
 
@@ -75,9 +75,8 @@ def train_and_score(
     Raises:
         InputError: a file cannot be used.
     """
-    if out_errors:
-        check_scorable(test_labels, truth, depth)
-    train_and_predict(
+    true = read_scorable(test_labels, truth, depth) if out_errors else None
+    test, on_common = train_and_predict(
         model=model,
         frames=frames,
         labels=labels,
@@ -93,30 +92,31 @@ def train_and_score(
         every=every,
         out_common=out_common,
     )
-    if out_errors and out_common_errors and out_metrics:
-        write_scores(
-            predictions=out_predictions,
-            labels=test_labels,
-            truth=truth,
-            train_labels=labels,
-            depth=depth,
-            camera=camera,
-            common=out_common,
-            common_truth=common,
-            wildcards=wildcards,
+    if true is not None and out_errors and out_metrics:
+        score_poses(
+            predicted=test.predicted,
+            labels=test.given,
+            truth=true,
+            train=read_pose_table(labels),
             out_errors=out_errors,
             out_metrics=out_metrics,
-            out_common_errors=out_common_errors,
+            info=wildcards,
+            depth=(depth, camera),
         )
+    if on_common is not None and out_common_errors:
+        score_common_poses(on_common.predicted, on_common.given, out_common_errors)
 
 
-def check_scorable(labels: Path, truth: Path, depth: Path) -> None:
-    """Check that the files which scores are made from can be read and belong together.
+def read_scorable(labels: Path, truth: Path, depth: Path) -> PoseTable:
+    """Read the true poses that scores are made from, and check that the other files belong to them.
 
     Args:
         labels: Poses of the test frames, as the data set labels them.
         truth: True poses of the test frames.
         depth: Depths of the cells of the test frames.
+
+    Returns:
+        The true poses.
 
     Raises:
         InputError: a file cannot be read, or they are not about the same frames.
@@ -128,3 +128,4 @@ def check_scorable(labels: Path, truth: Path, depth: Path) -> None:
             " rows); make both anew"
         )
     read_cell_depth(depth, len(labelled))
+    return true

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -23,6 +23,13 @@ DECIMALS = 6
 # Images per step; float32 sums may come out differently in the last digits at another number.
 BATCH = 100
 TIMED_CALLS = 10
+
+
+class Predictions(NamedTuple):
+    """Predicted poses of frames, and the poses of the same frames in the table that named them."""
+
+    predicted: PoseTable
+    given: PoseTable
 
 
 @memory_errors()
@@ -48,12 +55,33 @@ def predict_poses(
         InputError: one of the files cannot be used.
         MemoryError: there is too little memory.
     """
-    trained = read_checkpoint(model, open_device(device))
+    write_predictions(read_checkpoint(model, open_device(device)), frames, labels_like, out, every)
+
+
+@memory_errors()
+def write_predictions(
+    trained: TrainedLocalizer, frames: Path, labels_like: Path, out: Path, every: int = 1
+) -> Predictions:
+    """Do what :func:`predict_poses` does with a localizer in memory.
+
+    Args:
+        trained: The localizer, on the device to predict on.
+        frames: Packed frames of the split.
+        labels_like: A pose table that says which frames there are; its poses are not used.
+        out: Pose table to write; a value the network gives no finite number for is ``nan``.
+        every: Predict the first of each so many frames.
+
+    Raises:
+        InputError: one of the files cannot be used.
+        MemoryError: there is too little memory.
+    """
     table = read_pose_table(labels_like)
-    table = table.at(np.arange(0, len(table), every))
+    given = table.at(np.arange(0, len(table), every))
     input_px = trained.description.network.input_px
-    images = read_images(frames, len(table), input_px, trained.device, every)
-    write_pose_table(out, PoseTable(table.frame, table.path, *predict(trained, images)))
+    images = read_images(frames, len(given), input_px, trained.device, every)
+    predicted = PoseTable(given.frame, given.path, *predict(trained, images))
+    write_pose_table(out, predicted)
+    return Predictions(predicted, given)
 
 
 @torch.inference_mode()

@@ -23,7 +23,12 @@ from baselines.localizers.backbones.weights import load_backbone_weights
 from baselines.localizers.base import Localizer
 from baselines.localizers.memory import memory_errors
 from baselines.localizers.registry import build_localizer
-from baselines.training.checkpoint import ModelDescription, frame_camera, save_checkpoint
+from baselines.training.checkpoint import (
+    ModelDescription,
+    TrainedLocalizer,
+    frame_camera,
+    save_checkpoint,
+)
 from baselines.training.data import (
     ImageStatistics,
     LabelledFrames,
@@ -41,7 +46,7 @@ from baselines.training.fit import (
 )
 from baselines.training.optimizer import Schedule
 from baselines.training.photometric import PhotometricRandomisation
-from baselines.training.predict import predict_poses
+from baselines.training.predict import Predictions, write_predictions
 from baselines.training.record import write_training_record
 from baselines.training.resume import ResumeFile, digest
 from baselines.training.rotation import random_rotation
@@ -119,6 +124,18 @@ class Material(NamedTuple):
         return values
 
 
+class Trained(NamedTuple):
+    """What a training run ends with.
+
+    Attributes:
+        localizer: Localizer as its checkpoint has it, ready for prediction.
+        rows: History of the run.
+    """
+
+    localizer: TrainedLocalizer
+    rows: list[HistoryRow]
+
+
 @memory_errors()
 def train_localizer(
     job: Job,
@@ -133,7 +150,7 @@ def train_localizer(
     sequence_from_world: NDArray[np.float64] | None = None,
     scene: str | None = None,
     calibrated: bool = False,
-) -> list[HistoryRow]:
+) -> Trained:
     """Train a localizer and write its checkpoint and its history (columns of ``HistoryRow``).
 
     Beside the checkpoint lies ``resume.pt`` until the run is finished.
@@ -153,7 +170,7 @@ def train_localizer(
         calibrated: Store what tells pictures of another place from those of this one.
 
     Returns:
-        The history.
+        The localizer and its history.
 
     Raises:
         InputError: one of the files cannot be used.
@@ -183,7 +200,8 @@ def train_localizer(
     save_checkpoint(out_model, localizer, statistics, description, calibration)
     write_history(out_history, rows)
     resume.remove()
-    return rows
+    trained = TrainedLocalizer(description, localizer.eval(), statistics, calibration)
+    return Trained(trained, rows)
 
 
 TIMED_STEPS = 8
@@ -290,6 +308,18 @@ def _split(
     return (data.part(~mask), data.part(mask)) if mask.any() else (data, None)
 
 
+class Answers(NamedTuple):
+    """Predictions of a training run.
+
+    Attributes:
+        test: Those of the test frames.
+        common: Those of the common test set, where they were asked for.
+    """
+
+    test: Predictions
+    common: Predictions | None = None
+
+
 def train_and_predict(
     model: ModelName,
     frames: Path,
@@ -305,7 +335,7 @@ def train_and_predict(
     common: Path | None = None,
     every: int = 1,
     out_common: Path | None = None,
-) -> None:
+) -> Answers:
     """Train a localizer, and predict the test frames it is scored on.
 
     Args:
@@ -323,13 +353,16 @@ def train_and_predict(
         common: Pose table of the common test set, of whose frames one in ``every`` is predicted.
         every: Distance in frames between those of the common test set that are predicted.
         out_common: Poses of the common test set.
+
+    Returns:
+        The predictions.
     """
     inputs = {"frames": frames, "labels": labels, "test_frames": test_frames}
     inputs |= {"test_labels": test_labels} | ({"weights": weights} if weights else {})
     training = TrainingConfig(**run["training"], samples_seen={})
     network, hyper = NetworkConfig(**run["network"]), hyper_of(model)(**run["localizer"])
     job = Job(model, network, hyper, training, run["samples_seen"], run["seed"])
-    train_localizer(
+    trained = train_localizer(
         job=job,
         frames=frames,
         labels=labels,
@@ -339,19 +372,9 @@ def train_and_predict(
         test=(test_frames, test_labels),
     )
     write_training_record(out_record, run, inputs)
-    predict_poses(
-        model=out_model,
-        frames=test_frames,
-        labels_like=test_labels,
-        out=out_predictions,
-        device=training.device,
+    test = write_predictions(trained.localizer, test_frames, test_labels, out_predictions)
+    if not (common and out_common):
+        return Answers(test)
+    return Answers(
+        test, write_predictions(trained.localizer, test_frames, common, out_common, every)
     )
-    if common and out_common:
-        predict_poses(
-            model=out_model,
-            frames=test_frames,
-            labels_like=common,
-            out=out_common,
-            device=training.device,
-            every=every,
-        )

@@ -76,16 +76,7 @@ def score_run(
     info: Mapping[str, Any],
     depth: tuple[Path, CameraConfig] | None = None,
 ) -> None:
-    """Write the errors of every test frame, and what is printed of them.
-
-    ``position_m`` and ``orientation_deg`` are against ``labels``, which is what the paper reports;
-    the names ending in ``_true`` are against ``truth``. ``position_rms_m`` is the published code's
-    definition, the root mean square over the three axes. ``baseline_*`` are the median errors of
-    always answering the mean training pose, ``floor_*`` those of the true poses against ``labels``:
-    what a perfect localizer scores. ``failed`` counts predictions that are no pose, i.e. not finite
-    or without a unit quaternion; their error is infinite. Means and recalls are those of
-    :func:`synfeal.evaluation.metrics.summary`, ``dcre`` that of
-    :mod:`synfeal.evaluation.reprojection`. What is not finite is ``null`` in the JSON.
+    """Read predictions and what they are compared with, and score them by :func:`score_poses`.
 
     Args:
         predictions: Pose table of the test frames; may hold ``nan``.
@@ -103,11 +94,55 @@ def score_run(
     """
     check_same_labels(predictions.parent, labels)
     predicted = read_predictions(predictions)
-    label_table, true_table = _read_like(labels, predicted), _read_like(truth, predicted)
-    train = read_pose_table(train_labels)
-    errors = _both_scores(predicted, label_table, true_table)
-    constant = _both_scores(constant_pose(train, label_table), label_table, true_table)
-    floor = pose_errors(true_table, label_table)
+    score_poses(
+        predicted=predicted,
+        labels=_read_like(labels, predicted),
+        truth=_read_like(truth, predicted),
+        train=read_pose_table(train_labels),
+        out_errors=out_errors,
+        out_metrics=out_metrics,
+        info=info,
+        depth=depth,
+    )
+
+
+def score_poses(
+    predicted: PoseTable,
+    labels: PoseTable,
+    truth: PoseTable,
+    train: PoseTable,
+    out_errors: Path,
+    out_metrics: Path,
+    info: Mapping[str, Any],
+    depth: tuple[Path, CameraConfig] | None = None,
+) -> None:
+    """Write the errors of every test frame, and what is printed of them.
+
+    ``position_m`` and ``orientation_deg`` are against ``labels``, which is what the paper reports;
+    the names ending in ``_true`` are against ``truth``. ``position_rms_m`` is the published code's
+    definition, the root mean square over the three axes. ``baseline_*`` are the median errors of
+    always answering the mean training pose, ``floor_*`` those of the true poses against ``labels``:
+    what a perfect localizer scores. ``failed`` counts predictions that are no pose, i.e. not finite
+    or without a unit quaternion; their error is infinite. Means and recalls are those of
+    :func:`synfeal.evaluation.metrics.summary`, ``dcre`` that of
+    :mod:`synfeal.evaluation.reprojection`. What is not finite is ``null`` in the JSON.
+
+    Args:
+        predicted: Predicted poses of the test frames; may hold ``nan``.
+        labels: The test split's labels, of the same frames.
+        truth: The test split's true poses, of the same frames.
+        train: Labels that the run was trained on.
+        out_errors: CSV to write, one row per frame.
+        out_metrics: JSON to write.
+        info: Further keys of the JSON, e.g. what the run was.
+        depth: Depth that the test frames show, for the DCRE, and their camera.
+
+    Raises:
+        InputError: the depths cannot be read.
+    """
+    errors = _both_scores(predicted, labels, truth)
+    constant = _both_scores(constant_pose(train, labels), labels, truth)
+    floor = pose_errors(truth, labels)
     metrics: dict[str, Any] = {
         **info,
         **summary(errors, predicted.path),
@@ -120,7 +155,7 @@ def score_run(
     }
     if depth:
         depth_m = read_cell_depth(depth[0], len(predicted))
-        for end, reference in {"": label_table, "_true": true_table}.items():
+        for end, reference in {"": labels, "_true": truth}.items():
             found = dcre(predicted, reference, depth_m, depth[1])
             metrics |= dcre_summary(found, predicted.path, end)
     write_columns(out_errors, {"frame": predicted.frame, **errors})
@@ -142,7 +177,18 @@ def score_common(predictions: Path, truth: Path, out: Path) -> None:
     poses = whole.at(np.flatnonzero(np.isin(whole.frame, predicted.frame)))
     if not np.array_equal(poses.frame, predicted.frame):
         raise InputError(f"{predictions}: has frames that {truth} does not have; predict again")
-    write_columns(out, {"frame": predicted.frame, **pose_errors(predicted, poses)})
+    score_common_poses(predicted, poses, out)
+
+
+def score_common_poses(predicted: PoseTable, truth: PoseTable, out: Path) -> None:
+    """Write the errors on the common test set, against the true poses.
+
+    Args:
+        predicted: Predicted poses of some frames of the set; may hold ``nan``.
+        truth: True poses of the same frames.
+        out: CSV to write, one row per frame.
+    """
+    write_columns(out, {"frame": predicted.frame, **pose_errors(predicted, truth)})
 
 
 def _both_scores(poses: PoseTable, labels: PoseTable, truth: PoseTable) -> dict[str, Array]:

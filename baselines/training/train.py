@@ -157,7 +157,7 @@ def _trained(
 ) -> TrainedModel:
     """Train, write the record last, and remove what was needed on the way."""
     began = time.monotonic()
-    rows = train_localizer(
+    trained = train_localizer(
         run,
         packed.frames,
         packed.labels,
@@ -168,7 +168,7 @@ def _trained(
         scene=" + ".join(dict.fromkeys(own.scene for own in sets)),
         calibrated=True,
     )
-    errors = kept_errors(rows)
+    errors = kept_errors(trained.rows)
     n_frames = sum(map(len, sets))
     origin = provenance(job.seed, "")
     write_json(

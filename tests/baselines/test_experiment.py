@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.training.experiment import train_and_score
+from baselines.training.predict import predict_poses
 from baselines.training.score import write_scores
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
@@ -74,6 +75,18 @@ def test_scores_are_those_of_the_stored_predictions(files, tmp_path):
     )
     for name in ("out_errors", "out_metrics", "out_common_errors"):
         assert made[name].read_bytes() == scored[name].read_bytes()
+
+
+def test_predictions_are_those_of_the_checkpoint(files, tmp_path):
+    (tmp_path / "run").mkdir()
+    made = outputs(tmp_path / "run")
+    train_and_score(**files, **made)
+    again = tmp_path / "again.csv"
+    for name, every in {"predictions": 1, "common": 2}.items():
+        predict_poses(
+            made["out_model"], files["test_frames"], files["test_labels"], again, "cpu", every
+        )
+        assert again.read_bytes() == made[f"out_{name}"].read_bytes()
 
 
 def test_without_a_place_for_scores_there_are_predictions_alone(files, tmp_path):
