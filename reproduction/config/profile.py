@@ -48,9 +48,9 @@ class RenderSpeedConfig(Strict):
 class Config(DatasetConfig):
     """A profile: everything a run depends on."""
 
-    experiments: Path | tuple[dict[str, Any], ...] = Field(
+    experiments: Path | tuple[Path | dict[str, Any], ...] = Field(
         Path("config/experiments.csv"),
-        description="the design as a table: its CSV file, or a list of its rows",
+        description="the design as a table: its CSV file, or a list of such files and of rows",
     )
     tables: tuple[TableName, ...] | None = Field(
         None, description="tables of the design that are made; null: all that it has rows of"

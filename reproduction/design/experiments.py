@@ -198,13 +198,14 @@ def design_name(config: Config) -> str:
 
 def _given_rows(config: Config) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield every row as it is given, after the words that say where; nothing is checked."""
-    given, name = config.experiments, design_name(config)
-    if isinstance(given, Path):
-        header = f"the header must be {','.join(COLUMNS)}"
-        rows: Iterator[tuple[int, Mapping[str, Any]]] = iter(read_records(given, COLUMNS, header))
-    else:
-        rows = enumerate(given, start=1)
-    yield from ((f"{name}: row {number}", row) for number, row in rows)
+    given = config.experiments
+    for number, part in enumerate((given,) if isinstance(given, Path) else given, start=1):
+        if isinstance(part, Path):
+            header = f"the header must be {','.join(COLUMNS)}"
+            rows = read_records(part, COLUMNS, header)
+            yield from ((f"{part}: row {line}", row) for line, row in rows)
+        else:
+            yield f"experiments: row {number}", part
 
 
 def _problem(row: Experiment, config: Config) -> str:
