@@ -46,10 +46,11 @@ class JudgingRun(NamedTuple):
 
 
 RUNS = (
-    JudgingRun("labels", ("C1", "C2", "C3", "C4", "C6", "C15")),
+    JudgingRun("labels", ("C1", "C2", "C3", "C4", "C6")),
     JudgingRun("dose", ("C5", "C6")),
     JudgingRun("controls", ("C7", "C8", "C10", "C11", "C12")),
     JudgingRun("night", ("C13",), "table7_images_shown"),
+    JudgingRun("night", ("C15",), "table2_ground_truth"),
 )
 
 
