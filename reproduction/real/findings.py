@@ -12,8 +12,8 @@ import pandas as pd
 from reproduction.real.design import BOTH, GIVEN, PHOTOGRAPHS, RANDOMISED, RENDERED, SFM
 from reproduction.tables.columns import side_sheet
 from reproduction.tables.layouts import TITLES
-from reproduction.tables.real import DIRECTIONS, LOST, NAME, read_real, side_table
-from reproduction.tables.sheet import sheet_markdown
+from reproduction.tables.real import DIRECTIONS, LOST, METHODS, NAME, read_real, side_table
+from reproduction.tables.sheet import markdown_table, sheet_markdown
 from synfeal.records.tables import rows_of
 
 HEADLINE = "posenet2"
@@ -30,6 +30,74 @@ def real_findings(root: Path) -> str:
     """Say what a published run found, a sentence each."""
     table = read_real(root / "tables" / f"{NAME}.csv")
     return "\n".join(f"- {sentence}" for sentence in sentences(table))
+
+
+# Rows of the short table: what they learn from, method (None: the best localizer), and in words.
+SHORT = (
+    (PHOTOGRAPHS, HEADLINE, "photographs of the scan"),
+    (RENDERED, HEADLINE, "renderings as they are"),
+    (RANDOMISED, HEADLINE, "randomised renderings"),
+    (RANDOMISED, None, "randomised renderings"),
+    (BOTH, None, "randomised renderings and photographs of the scan"),
+    (RENDERED, "structure", "renderings"),
+    (RENDERED, "structure-refined", "renderings"),
+    (RENDERED, "retrieval", "renderings"),
+)
+
+
+def real_headline(root: Path) -> str:
+    """Tabulate the few rows of a published run that a visitor wants to see first."""
+    table = read_real(root / "tables" / f"{NAME}.csv")
+    given = table[table.labels == GIVEN]
+    main = given[given.direction == given.direction.iloc[0]]
+    lines = []
+    for trained_on, method, words in SHORT:
+        row = _best(main, trained_on) if method is None else _one(main, trained_on, method)
+        if row is None:
+            continue
+        name = METHODS[row.method]
+        of_all = " (best of five)" if method is None else ""
+        lines.append(
+            {
+                "method": f"{name}{of_all}",
+                "learned or mapped from": words,
+                "median error (95 % limits)": _in_cm(row),
+                "within 5 cm and 5°": f"{100 * row.recall_5cm_5deg:.0f} %",
+                "seeds": str(row.n_seeds),
+            }
+        )
+    shown = markdown_table(pd.DataFrame(lines))
+    direction = DIRECTIONS[str(main.direction.iloc[0])]
+    head = f"{direction}; {int(main.n_test.iloc[0]):,} photographs:"
+    return "\n\n".join([head, shown, *_worth(main)])
+
+
+def _in_cm(row: Any) -> str:
+    """Format both errors of a row, the position with its limits."""
+    if not math.isfinite(row.position_m):
+        return LOST
+    low, high = 100 * row.position_m_low, 100 * row.position_m_high
+    return f"{100 * row.position_m:.1f} cm ({low:.0f} – {high:.0f}), {row.orientation_deg:.1f}°"
+
+
+def _worth(table: pd.DataFrame) -> Iterator[str]:
+    """Say what renderings are worth beside photographs of the scan, as they are and randomised."""
+    plain, randomised = (_one(table, source, HEADLINE) for source in (RENDERED, RANDOMISED))
+    if plain is None or randomised is None or not math.isfinite(plain.times_position):
+        return
+    yield (
+        f"Randomised renderings have random light, lenses and sensors. Trained on them,"
+        f" {TITLES[HEADLINE]} is {randomised.times_position:.1f} times as exact as trained on"
+        f" photographs of the scan ({_limits(randomised)}); trained on renderings as they are,"
+        f" {plain.times_position:.1f} times ({_limits(plain)})."
+    )
+
+
+def _best(table: pd.DataFrame, trained_on: str) -> Any | None:
+    """Return the localizer with the lowest position error."""
+    trained = table[table.method.isin(list(TITLES)) & (table.trained_on == trained_on)]
+    rows = rows_of(trained.sort_values("position_m"))
+    return rows[0] if len(rows) > 1 and math.isfinite(rows[0].position_m) else None
 
 
 def real_table(root: Path) -> str:

@@ -21,7 +21,7 @@ import pandas as pd
 
 from baselines.config.learning import MODELS
 from reproduction.claims.table import claims_markdown
-from reproduction.real.findings import real_findings, real_table
+from reproduction.real.findings import real_findings, real_headline, real_table
 from reproduction.report.findings import can_tell, read_table, sentences, verdict_sentence
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
 from reproduction.report.fresh import fresh_claims, fresh_sentence
@@ -169,6 +169,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "tested": lambda root: fresh_sentence(root.parent),
     "difficulty": lambda root: difficulty(),
     "real": real_findings,
+    "real_headline": real_headline,
     "photographs": real_table,
 }
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from reproduction.real.figures import draw_amount, draw_cover
-from reproduction.real.findings import real_findings, real_table
+from reproduction.real.findings import real_findings, real_headline, real_table
 from reproduction.report.html.page import _real_table
 from reproduction.tables.columns import write_side
 from reproduction.tables.real import AMOUNT, COVER, NAME, SCHEMA, read_real, side_table
@@ -79,6 +79,29 @@ def test_sentences_give_the_numbers_of_their_rows(root):
     assert "Structure, with a map of renderings: half not localized, 25 % within 5 cm" in text
     assert "Structure, with a map of renderings, refined on the scan: 0.050 m / 2.0°" in text
     assert "the mean pose by 0.620 m / 24.8°" in text
+
+
+def test_the_short_table_has_the_best_localizer_and_the_main_direction_alone(root):
+    lines = real_headline(root).splitlines()
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if "|" in line]
+    errors = {tuple(row[:2]): row[2] for row in cells[2:]}
+    assert errors["PoseNet2", "photographs of the scan"] == "48.0 cm (24 – 72), 19.2°"
+    assert errors["PoseNet2 (best of five)", "randomised renderings"] == "12.0 cm (6 – 18), 4.8°"
+    assert errors["Structure", "renderings"] == "half not localized"
+    assert errors["Structure, refined on the scan", "renderings"].startswith("5.0 cm (2")
+    assert len(errors) == 6
+    assert "500 photographs" in lines[0]
+    assert "33.0" not in real_headline(root)  # of the reverse direction
+
+
+def test_what_renderings_are_worth_is_told_where_both_kinds_were_learned_from(root):
+    assert "as exact" not in real_headline(root)
+    path = root / "tables" / f"{NAME}.csv"
+    table = read_real(path)
+    plain = row("forward", "rendered", "posenet2", 0.4, **around("times_position", 1.2))
+    write_frame(path, frame_of([*table.to_dict("records"), plain], SCHEMA))
+    assert "is 4.0 times as exact" in real_headline(root)
+    assert "as they are, 1.2 times (95 % limits 0.6 to 1.8)" in real_headline(root)
 
 
 def test_the_table_is_the_same_on_page_on_paper_and_in_markdown(root):
