@@ -13,7 +13,7 @@ from pydantic import Field
 from baselines.config.labels import GroundTruthConfig
 from baselines.labels.chain import fill_gaps
 from baselines.labels.kinect_fusion import kinect_fusion_batch
-from baselines.labels.posegraph.optimise import optimise_lm
+from baselines.labels.posegraph.levenberg_marquardt import optimise_lm
 from baselines.labels.rgbd import rgbd_graph
 from baselines.labels.sfm import sfm_batch
 from synfeal.config.collection import Strict

@@ -12,7 +12,7 @@ from scipy.stats import kstest
 from baselines.config.labels import PoseGraphConfig
 from baselines.labels import injected
 from baselines.labels.methods import solve_graph
-from baselines.labels.posegraph import optimise, toro
+from baselines.labels.posegraph import levenberg_marquardt, toro
 from baselines.labels.posegraph.graph import Edge, PoseGraph
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import pose_matrix, relative
@@ -72,7 +72,7 @@ def two_parts() -> PoseGraph:
 
 def by_lm(graph: PoseGraph) -> Array:
     """Optimise with more than enough iterations of Levenberg-Marquardt: poses (N, 4, 4)."""
-    return optimise.optimise_lm(graph, 100)
+    return levenberg_marquardt.optimise_lm(graph, 100)
 
 
 def by_toro(graph: PoseGraph) -> Array:

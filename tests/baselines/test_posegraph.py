@@ -20,7 +20,8 @@ from baselines.labels.posegraph.graph import (
     swapped_blocks,
     write_g2o,
 )
-from baselines.labels.posegraph.optimise import optimise_lm, optimise_open3d
+from baselines.labels.posegraph.levenberg_marquardt import optimise_lm
+from baselines.labels.posegraph.open3d_optimiser import optimise_open3d
 from baselines.labels.posegraph.toro import optimise_toro, spanning_tree
 from synfeal.geometry.poses import pose_error, pose_matrix, relative
 from tests.support.property_support import (

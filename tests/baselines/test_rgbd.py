@@ -5,7 +5,7 @@ from PIL import Image
 
 from baselines.config.labels import KinectFusionConfig, RgbdConfig
 from baselines.labels.kinect_fusion import kinect_fusion_batch
-from baselines.labels.posegraph.optimise import optimise_lm
+from baselines.labels.posegraph.levenberg_marquardt import optimise_lm
 from baselines.labels.rgbd import dense, frames, rgbd_graph
 from baselines.labels.rgbd.dense import depth_agreement
 from baselines.labels.rgbd.frames import read_frame

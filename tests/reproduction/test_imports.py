@@ -52,6 +52,14 @@ BUDGETS = {
         "trimesh",
         "scipy",
     ],
+    "baselines.labels.posegraph.toro:by_toro": ["torch", "matplotlib", "pandas", "open3d", "gtsam"],
+    "baselines.labels.posegraph.levenberg_marquardt:by_g2o": [
+        "torch",
+        "matplotlib",
+        "pandas",
+        "open3d",
+        "numba",
+    ],
     "synfeal.planning.plan:write_plan": ["torch", "matplotlib", "pandas"],
 }
 OPTIMISERS = """

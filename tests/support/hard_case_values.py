@@ -20,8 +20,8 @@ from mpmath import MPContext
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
-from baselines.labels.posegraph import optimise
 from baselines.labels.posegraph.graph import PoseGraph
+from baselines.labels.posegraph.levenberg_marquardt import factors_of
 from reproduction.hard_cases import cases, estimates, scenes
 from reproduction.hard_cases.values import FILE, REFUSED, error_of
 from synfeal.geometry import poses
@@ -311,7 +311,7 @@ def pose_graphs():
 
 def gauss_newton(graph):
     """Poses (N, 4, 4) by Gauss-Newton: every step taken as it comes."""
-    optimizer = gtsam.GaussNewtonOptimizer(*optimise.factors_of(graph), gtsam.GaussNewtonParams())
+    optimizer = gtsam.GaussNewtonOptimizer(*factors_of(graph), gtsam.GaussNewtonParams())
     result = optimizer.optimize()
     return np.array([result.atPose3(node).matrix() for node in range(len(graph))])
 

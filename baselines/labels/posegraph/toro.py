@@ -42,8 +42,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.config.labels import PoseGraphConfig
 from baselines.labels.posegraph.graph import PoseGraph, chi2
 from baselines.labels.posegraph.sweep import sweep
+from baselines.registry.kinds import LabelMethod
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of, relative
 
 Array = NDArray[np.float64]
@@ -116,6 +118,18 @@ def optimise_toro(graph: PoseGraph, iterations: int, epsilon: float) -> Array:
         if gains.max() < 1 and abs(previous - error) <= epsilon * previous:
             break
     return poses
+
+
+@LabelMethod(
+    name="rgbd-toro",
+    title="RGB-D SLAM w/ TORO",
+    rank=2,
+    works_on="graph",
+    published_assisted=6,
+)
+def by_toro(graph: PoseGraph, cfg: PoseGraphConfig) -> NDArray[np.float64]:
+    """Optimise a pose graph by TORO; see :func:`optimise_toro`."""
+    return optimise_toro(graph, cfg.toro_iterations, cfg.toro_epsilon)
 
 
 def spanning_tree(graph: PoseGraph) -> NDArray[np.int64]:
