@@ -60,6 +60,7 @@ BUDGETS = {
         "open3d",
         "numba",
     ],
+    "baselines.references.varied:write_varied": ["torch", "matplotlib", "pandas", "open3d"],
     "synfeal.planning.plan:write_plan": ["torch", "matplotlib", "pandas"],
 }
 OPTIMISERS = """

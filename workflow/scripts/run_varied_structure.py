@@ -1,6 +1,6 @@
 """Draw some test frames with effects, and write what ``structure-depth`` answers for them."""
 
-from baselines.references.robustness import write_varied
+from baselines.references.varied import write_varied
 from reproduction.runs.job import run_job
 
 run_job(
