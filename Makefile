@@ -114,7 +114,8 @@ clean:  ## remove results of the smoke profile and caches
 $(INSTALLED): $(LOCK) pyproject.toml baselines/pyproject.toml reproduction/pyproject.toml setup/system_packages.sh
 	setup/system_packages.sh $(PYTHON)
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --requirement $(LOCK)
+	@# Modules are compiled when they are first imported, which most of these never are.
+	$(BIN)/python -m pip install --quiet --no-compile --requirement $(LOCK)
 	setup/meshoptimizer.sh $(BIN)/python
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable . --editable ./baselines --editable ./reproduction
 	touch $@
