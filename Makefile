@@ -79,7 +79,7 @@ test-isolated: $(SLURM_INSTALLED)  ## the smoke profile here, and with every job
 
 coverage: $(QUALITY)  ## which lines the test suite runs (results/benchmarks/coverage.md)
 	$(BIN)/coverage erase
-	$(BIN)/coverage run -m pytest
+	OMP_NUM_THREADS=1 $(BIN)/coverage run -m pytest --numprocesses $(CORES) --dist loadfile
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --skip-covered --format markdown > results/benchmarks/coverage.md
 
