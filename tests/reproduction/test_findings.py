@@ -10,7 +10,13 @@ import pandas as pd
 import pytest
 
 from reproduction.report import findings_figure, published_claims
-from reproduction.report.findings import FINDINGS, can_tell, findings, sentences
+from reproduction.report.findings import (
+    FINDINGS,
+    can_tell,
+    findings,
+    run_of_labels,
+    sentences,
+)
 from reproduction.report.intervals import Interval, cell_interval, mean_change
 from reproduction.report.published_claims import interval_in, rows_now, rules_note
 from reproduction.statistics.seeds import half_width
@@ -156,9 +162,10 @@ def test_size_and_images(told):
 
 def test_labels_of_estimators(told):
     finding = told["no_difference_at_this_dose"]
-    errors = table("label_error").query("scene == 'large_room' and split == 'train'")
+    root = NIGHT.with_name(finding.run or NIGHT.name)
+    errors = table("label_error", root).query("scene == 'large_room' and split == 'train'")
     errors = errors[errors.assistance == "after"].set_index("method")
-    cells = table("table2_ground_truth")
+    cells = table("table2_ground_truth", root)
     names = ("sfm", "rgbd-toro", "rgbd-g2o")
     exact_rows = cells[cells.labels == "synfeal"]
     doses = [(100 * errors.position_m_median[n], errors.orientation_deg_median[n]) for n in names]
@@ -169,7 +176,7 @@ def test_labels_of_estimators(told):
     ]
     sfm = cells[cells.labels == "sfm"].merge(exact_rows, on="model", suffixes=("_sfm", "_exact"))
     lower = sum((sfm[f"{m}_exact"] < sfm[f"{m}_sfm"]).sum() for m in (POSITION, ORIENTATION))
-    claims = {row["id"]: row for _, row in read_records(NIGHT / "claims.csv")}
+    claims = {row["id"]: row for _, row in read_records(root / "claims.csv")}
     (p, o), limits = numbers(claims["C2"]["measured_true"]), numbers(claims["C2"]["interval_true"])
     text = finding.evidence.replace("g2o", "g").replace("PoseNet2", "PoseNet")
     expected = [round(n, 1) for dose in doses for n in dose]
@@ -178,6 +185,24 @@ def test_labels_of_estimators(told):
     expected += [lower, 10, *(round(n) for n in (p, *limits[:2], o, *limits[2:]))]
     expected += [-55, -60]  # 0.14 / 0.31 and 6.70 / 16.57 in Table 2 of the paper
     assert numbers(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("folder", "seed", "told_by"),
+    [
+        ("published", "1", "labels"),
+        ("published", "0", "night"),  # seen before the rules were frozen
+        ("results", "1", "night"),  # somebody's own runs are told by themselves
+    ],
+)
+def test_labels_are_told_by_a_published_run_with_fresh_seeds(tmp_path, folder, seed, told_by):
+    other = tmp_path / folder / "labels"
+    other.mkdir(parents=True)
+    claims = pd.read_csv(NIGHT.with_name("mini") / "claims.csv", dtype=str)
+    claims.assign(seed=seed).to_csv(other / "claims.csv", index=False)
+    assert run_of_labels(other.with_name("night")).name == told_by
+    (other / "claims.csv").unlink()
+    assert run_of_labels(other.with_name("night")).name == "night"
 
 
 def test_sentences_name_the_metres_that_labels_truly_moved_by(tmp_path):
