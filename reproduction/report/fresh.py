@@ -157,7 +157,12 @@ def _runs(published: Path, judged: Sequence[Judged]) -> str:
 def _open(judged: Sequence[Judged]) -> str:
     """List the claims that no fresh seed has decided, by the run that would."""
     decided = {found.claim.id for found in judged if found.decided}
-    items = []
+    items = [
+        f"- {found.claim.id}: more training runs per cell of `{found.profile}`; limits shrink with"
+        " the root of their number."
+        for found in judged
+        if not found.decided
+    ]
     for run in RUNS:
         left = [claim for claim in run.claims if claim not in decided]
         if left and not _was_run(run, judged):

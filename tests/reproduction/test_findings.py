@@ -182,9 +182,13 @@ def test_labels_of_estimators(told):
     expected = [round(n, 1) for dose in doses for n in dose]
     expected += [round(100 * exact_rows[POSITION].min()), round(100 * exact_rows[POSITION].max())]
     expected += [round(n) for n in changes]
-    expected += [lower, 10, *(round(n) for n in (p, *limits[:2], o, *limits[2:]))]
-    expected += [-55, -60]  # 0.14 / 0.31 and 6.70 / 16.57 in Table 2 of the paper
-    assert numbers(text) == expected
+    expected += [lower, 10]
+    found = numbers(text)
+    assert found[: len(expected)] == expected
+    # Halves of a percent may be rounded either way.
+    judged = [p, *limits[:2], o, *limits[2:]]
+    assert found[len(expected) : -2] == pytest.approx(judged, abs=0.501)
+    assert found[-2:] == [-55, -60]  # 0.14 / 0.31 and 6.70 / 16.57 in Table 2 of the paper
 
 
 @pytest.mark.parametrize(
@@ -206,8 +210,9 @@ def test_labels_are_told_by_a_published_run_with_fresh_seeds(tmp_path, folder, s
 
 
 def test_sentences_name_the_metres_that_labels_truly_moved_by(tmp_path):
-    root = tmp_path / "night"
-    shutil.copytree(NIGHT, root)
+    root = tmp_path / "published/night"
+    for path in (NIGHT, NIGHT.with_name("labels")):
+        shutil.copytree(path, root.with_name(path.name))
     path = root / "tables/table3_inconsistencies.csv"
     cells = pd.read_csv(path)
     cells.assign(moved_m=3**0.5 * cells.noise_m).to_csv(path, index=False)
