@@ -133,8 +133,8 @@ def fill_assistance(root, assisted=None, size="6k", batches=(12, 5), scene="larg
 
 def shipped_design():
     config = load_config(CONFIG / "config.yaml", CONFIG / "complete.yaml")
-    path = CONFIG / "experiments.csv"
-    return read_experiments(config.model_copy(update={"experiments": path}))
+    files = tuple(CONFIG / f"experiments{name}.csv" for name in ("", "-kinect_fusion"))
+    return read_experiments(config.model_copy(update={"experiments": files}))
 
 
 def complete_results(root):
