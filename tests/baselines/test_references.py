@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 
 from baselines.config.references import ReferencesConfig
+from baselines.references import interpolated
 from baselines.references.arrays import most_alike
 from baselines.references.correspondences import (
     Tracks,
@@ -21,7 +23,7 @@ from baselines.references.correspondences import (
 from baselines.references.descriptors import Vlad, dense_sift, residuals, thumbnails
 from baselines.references.evidence import Evidence
 from baselines.references.features import Features, write_features
-from baselines.references.interpolated import RIDGE, affine_weights, combined
+from baselines.references.interpolated import RIDGE, affine_weights, by_interpolation, combined
 from baselines.references.registry import in_group
 from baselines.references.retrieval import METRES_PER_RADIAN, nearest_rows
 from baselines.references.run import answer_and_score
@@ -294,3 +296,42 @@ def test_weights_solve_the_constrained_least_squares():
         expected = np.linalg.solve(system, [*(own @ wanted), 1.0])[:6]
         assert found == pytest.approx(expected)
         assert found.sum() == pytest.approx(1)
+
+
+def test_negative_weights_lead_beyond_the_poses():
+    """Half as far beyond the first pose as the second one lies before it, turned likewise."""
+    ends = np.stack([pose_at([0, 0, 1], yaw_deg=0), pose_at([4, 2, 1], yaw_deg=20)])
+    (found,) = combined(ends[None], np.array([[1.5, -0.5]]))
+    np.testing.assert_allclose(found[:3, 3], [-2, -1, 1])
+    # The sum of turns about one axis points where the sum of arrows of these directions does.
+    yaw_deg = np.degrees(np.angle(1.5 - 0.5 * np.exp(1j * np.radians(20))))
+    expected = pose_at([-2, -1, 1], yaw_deg=yaw_deg)
+    assert pose_error(found, expected)[1] == pytest.approx(0, abs=1e-7)
+
+
+def test_combined_rotations_are_the_nearest_ones_even_where_the_sum_is_a_reflection():
+    """The nearest rotation by Wahba's problem, which SciPy solves."""
+    rng = np.random.default_rng(2)
+    rotations = Rotation.random(80 * 4, rng=rng).as_matrix().reshape(80, 4, 3, 3)
+    weights = rng.normal(size=(80, 4))
+    weights += (1 - weights.sum(axis=1, keepdims=True)) / 4
+    sums = np.einsum("nk,nkij->nij", weights, rotations)
+    assert 5 < (np.linalg.det(sums) < 0).sum() < 75
+    found = combined(pose_matrix(rotations, np.zeros((80, 4, 3))), weights)[:, :3, :3]
+    nearest = [Rotation.align_vectors(each.T, np.eye(3))[0].as_matrix() for each in sums]
+    np.testing.assert_allclose(found, np.stack(nearest), atol=1e-6)
+
+
+def test_each_of_many_queries_has_its_own_answer(monkeypatch):
+    """In parts of three or all at once; each lies between two training images of its own."""
+    train = random_table(24, 5)
+    vectors = np.linalg.qr(np.random.default_rng(3).normal(size=(40, 24)))[0].T.astype(np.float32)
+    first, second = np.arange(0, 22, 2), np.arange(1, 23, 2)
+    evidence = Evidence({}, CAMERA, 0)
+    queries = (vectors[first] + vectors[second]) / 2
+    evidence.__dict__.update(train=train, descriptors={"vlad": (vectors, queries)})
+    expected_m = (train.position_m[first] + train.position_m[second]) / 2
+    for at_once in (3, 500):
+        monkeypatch.setattr(interpolated, "CHUNK", at_once)
+        found = by_interpolation(evidence)
+        np.testing.assert_allclose(found[:, :3, 3], expected_m, atol=0.01)

@@ -15,6 +15,7 @@ from baselines.labels.chain import TruthUsed, chain_batches, chain_unassisted, w
 from baselines.labels.methods import truth_used
 from baselines.references.adjustment import placed_on
 from baselines.references.correspondences import Tracks
+from baselines.references.interpolated import by_interpolation
 from baselines.references.retrieval import nearest_label
 from baselines.references.structure import lifted, triangulate
 from baselines.training.data import read_labelled_frames
@@ -105,6 +106,23 @@ def test_the_nearest_image_is_one_that_was_registered():
     np.testing.assert_array_equal(found[known], table.position_m[known])
     np.testing.assert_array_equal(found[2], table.position_m[1])
     np.testing.assert_array_equal(found[3], table.position_m[4])
+
+
+def test_labels_that_were_filled_in_have_no_part_in_interpolated_poses():
+    """Each test image is a training image; what was filled in is far away from all of them."""
+    table = labelled(12)
+    far = table.position_m.copy()
+    far[LOST] = 1e6
+    vectors = np.linalg.qr(np.random.default_rng(1).normal(size=(12, 12)))[0].astype(np.float32)
+    evidence = SimpleNamespace(
+        train=replace(table, position_m=far),
+        descriptors={"vlad": (vectors, vectors)},
+        preparing=nullcontext,
+    )
+    found = by_interpolation(evidence)[:, :3, 3]
+    known = np.setdiff1d(np.arange(12), LOST)
+    np.testing.assert_allclose(found[known], table.position_m[known], atol=0.01)
+    assert np.abs(found[LOST]).max() < np.abs(table.position_m).max() + 1
 
 
 def test_depth_of_a_frame_that_was_not_registered_lifts_nothing():
