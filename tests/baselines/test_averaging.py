@@ -49,6 +49,17 @@ def test_a_run_of_one_step_keeps_its_weights():
     assert (built[0].weight == 3.0).all()
 
 
+@pytest.mark.parametrize("steps", [7, 101, 102, 103, 104])
+def test_the_last_weights_are_counted_however_long_the_run_is(steps):
+    built = network()
+    average = WeightAverage(built, steps)
+    for done in range(1, steps + 1):
+        set_to(built, float(done == steps))
+        average.after(done)
+    average.apply()
+    assert (built[0].weight > 0).all()
+
+
 @pytest.fixture(scope="module")
 def splits(tmp_path_factory):
     return write_split(tmp_path_factory.mktemp("split"), "train", 60, 0)

@@ -75,3 +75,15 @@ def test_gradients_of_nothing_give_no_step():
         gradients = torch.full((1, 4, 6), scale)
         root = inverse_square_root(gradients @ gradients.mT, quintics_for(LOWEST, ITERATIONS))
         assert (root @ gradients).abs().max() < 1e-3
+
+
+def test_matrices_of_a_stack_have_nothing_to_do_with_each_other():
+    """Of whatever size; an orthogonal factor does not depend on it at all."""
+    torch.manual_seed(1)
+    quintics = quintics_for(LOWEST, ITERATIONS)
+    gradients = torch.randn(4, 6, 20, dtype=torch.float64)
+    scaled = gradients * torch.tensor([1e-6, 1e-2, 1.0, 1e3])[:, None, None].double()
+    together = inverse_square_root(scaled @ scaled.mT, quintics) @ scaled
+    for alone, found in zip(gradients, together, strict=True):
+        root = inverse_square_root((alone @ alone.mT)[None], quintics)[0]
+        torch.testing.assert_close(found, root @ alone, rtol=0, atol=1e-9)

@@ -164,9 +164,10 @@ def test_frames_of_the_place_are_called_outside_as_often_as_stated_and_others_ne
     assert (foreign <= OUTSIDE).mean() > 0.8
 
 
-def test_a_large_training_set_is_thinned_evenly(place):
+def test_a_large_training_set_is_thinned_evenly(place, calibrated):
+    """Frames that are there a dozen times: each is kept as often, and on its own path."""
     trained, (learned, held_out, _) = untrained(), place
-    chosen = np.arange(MOST_FRAMES + 500) % len(learned)
+    chosen = np.arange(MOST_FRAMES + 500) * len(learned) // (MOST_FRAMES + 500)
     rows = torch.from_numpy(chosen)
     many = LabelledFrames(
         learned.images,
@@ -175,10 +176,40 @@ def test_a_large_training_set_is_thinned_evenly(place):
         learned.path[chosen],
         rows,
     )
-    found = calibrate(trained.network, trained.statistics, many, held_out, None)
-    assert len(found.features) == MOST_FRAMES
-    assert len(found.distance) == MOST_FRAMES + len(held_out)
-    assert (found.distance.diff() >= 0).all()
+    both = calibrate(trained.network, trained.statistics, many, held_out, None)
+    found = calibrate(trained.network, trained.statistics, many, None, None)
+    for thinned, count in ((both, MOST_FRAMES + len(held_out)), (found, MOST_FRAMES)):
+        assert len(thinned.features) == MOST_FRAMES
+        assert len(thinned.distance) == count
+        assert (thinned.distance.diff() >= 0).all()
+    once = calibrated.calibration.features.double()
+    which = torch.cdist(found.features.double(), once).argmin(dim=1)
+    times = torch.bincount(which, minlength=len(learned)).double() * len(learned) / MOST_FRAMES
+    assert (times - 1).abs().max() < 0.2
+    path = learned.path[which.numpy()]
+    expected = nearest_distance(found.features, found.features, (path, path))
+    torch.testing.assert_close(found.distance, expected.sort().values)
+
+
+def test_frames_are_compared_under_the_light_that_they_were_learned_in(place):
+    """Negatives made of the frames are as far from each other as frames that are negatives."""
+    trained, (learned, held_out, _) = untrained(), place
+    negatives = [replace(part, images=255 - part.images) for part in (learned, held_out)]
+    expected = calibrate(trained.network, trained.statistics, *negatives, None)
+    found = calibrate(trained.network, trained.statistics, learned, held_out, lambda i: 255 - i)
+    for one, other in zip(found, expected, strict=True):
+        assert torch.equal(one, other)
+    plain = calibrate(trained.network, trained.statistics, learned, held_out, None)
+    assert not torch.allclose(plain.distance, found.distance)
+
+
+def test_a_network_that_was_just_trained_is_calibrated_as_it_will_answer(place, calibrated):
+    """Without what it does in training alone: dropout, and statistics of the batch."""
+    trained, (learned, held_out, _) = untrained(), place
+    trained.network.train()
+    found = calibrate(trained.network, trained.statistics, learned, held_out, None)
+    for one, other in zip(found, calibrated.calibration, strict=True):
+        assert torch.equal(one, other)
 
 
 def test_too_few_frames_one_path_or_a_diverged_network_have_no_calibration(place):
