@@ -8,14 +8,19 @@ import pytest
 import synfeal
 from synfeal.camera.projection import cell_pixels
 from synfeal.cli import main
+from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.frame_files import encode_png
+from synfeal.dataset.sevenscenes import Sequence, pose_text, write_splits
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
+from synfeal.pairs import overlap
 from synfeal.pairs.choose import Choice
 from synfeal.pairs.correspondence import DepthImage, State
-from synfeal.pairs.flow import flow_between, read_flows
+from synfeal.pairs.flow import Flow, flow_between, read_flows, write_flows
 from synfeal.pairs.overlap import grid_points, overlaps_with
 from synfeal.pairs.run import read_pairs
+from synfeal.records.files import write_json
 from tests.support.brute_rays import Truth, first_hits
 from tests.support.collected import collect, refused, save_room
 from tests.support.ray_scenes import SCENES, scene
@@ -130,7 +135,9 @@ def test_flow_and_what_is_hidden_are_those_of_rays(cast):
     assert len(np.unique(pair.state)) >= 3
 
 
-def test_overlap_is_the_share_that_rays_reach(cast):
+@pytest.mark.parametrize("at_once", [1, 10**6])
+def test_overlap_is_the_share_that_rays_reach(cast, monkeypatch, at_once):
+    monkeypatch.setattr(overlap, "POINTS_AT_ONCE", at_once)
     camera, pair = cast
     depths = [in_millimetres(each.depth_m).astype(np.float32) for each in (pair.a, pair.b)]
     poses = np.stack([pair.pose_a, pair.pose_b])
@@ -172,6 +179,32 @@ def test_at_an_edge_both_sides_are_shown_and_at_a_crease_what_is_between():
     crease = 4.0 - 0.1 * np.abs(column - 10.2)
     assert shown(crease, [[10.2, 5.0], [5.25, 5.0]], [3.97, 3.505]).all()
     assert not shown(crease, [[10.2, 5.0], [5.25, 5.0]], [3.8, 3.45]).any()
+
+
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_planes_stay_exact_up_to_the_four_pixels_that_a_crease_runs_between(along):
+    """The crease is at 10.2, between centres of pixels; depth at 9.25 is that of one plane."""
+    column, _ = np.meshgrid(np.arange(20) + 0.5, np.arange(20) + 0.5)
+    crease = 4.0 - 0.1 * np.abs(column - 10.2)
+    beside, between = np.array([[9.25, 5.0]]), np.array([[9.9, 5.0]])
+    if along == "y":
+        crease, beside, between = crease.T, beside[:, ::-1], between[:, ::-1]
+    assert shown(crease, beside, [3.905]).all()
+    assert not shown(crease, beside, [3.85]).any()  # as of pixels beside, but not of this place
+    assert shown(crease, between, [3.96]).all()
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_what_lies_along_a_slanting_crease_is_shown_wherever_it_runs(turn):
+    """However far it cuts off whichever of four pixels: a ramp begins at it, on a wall."""
+    column, row = np.meshgrid(np.arange(20) + 0.5, np.arange(20) + 0.5)
+    at = np.random.default_rng(1).uniform(1.0, 19.0, (4000, 2))
+    for start in np.linspace(15.0, 16.0, 21):
+        ramp = 4.0 / (1.0 + 0.08 * np.maximum(0.0, column + row - start))
+        expected_m = 4.0 / (1.0 + 0.08 * np.maximum(0.0, at.sum(axis=1) - start))
+        place = at if turn == 1 else np.column_stack([20.0 - at[:, 0], at[:, 1]])
+        image = DepthImage(ramp[:, ::turn])
+        assert image.shows(place, expected_m, 0.01 * expected_m).all()
 
 
 def test_choice_keeps_the_greatest_overlaps_of_each_frame():
@@ -274,3 +307,228 @@ def test_a_set_without_depth_and_a_directory_that_is_not_empty_are_refused(
         read_pairs(tmp_path / "full")
     with pytest.raises(InputError, match="run synfeal pairs --flow again"):
         read_flows(tmp_path / "full" / "mine.txt")
+
+
+def test_flows_are_read_as_they_were_written(tmp_path):
+    rng = np.random.default_rng(3)
+    flows = [
+        Flow(
+            rng.normal(size=(4, 5, 2)).astype(np.float32),
+            rng.integers(0, 4, (4, 5), dtype=np.uint8),
+        )
+        for _ in range(2)
+    ]
+    write_flows(tmp_path / "flow.npz", *flows)
+    for written, read in zip(flows, read_flows(tmp_path / "flow.npz"), strict=True):
+        np.testing.assert_array_equal(read.flow_px, written.flow_px)
+        np.testing.assert_array_equal(read.state, written.state)
+
+
+def sphere_depth_m(position_m, direction):
+    """Lengths (...) of rays of unit length (..., 3) from within a ball of 3 m about the origin."""
+    along = direction @ position_m
+    return -along + np.sqrt(along**2 + 9.0 - position_m @ position_m)
+
+
+def panorama_ray(camera, pixel):
+    longitude = 2 * np.pi * (pixel[..., 0] / camera.width - 0.5)
+    latitude = np.pi * (pixel[..., 1] / camera.height - 0.5)
+    across = np.cos(latitude)
+    return np.stack(
+        [across * np.sin(longitude), np.sin(latitude), across * np.cos(longitude)], axis=-1
+    )
+
+
+def panorama_pixel(camera, direction):
+    x, y, z = np.moveaxis(direction / np.linalg.norm(direction, axis=-1, keepdims=True), -1, 0)
+    column = (0.5 + np.arctan2(x, z) / (2 * np.pi)) * camera.width
+    return np.stack([column, (0.5 + np.arcsin(y) / np.pi) * camera.height], axis=-1)
+
+
+def fisheye_ray(camera, pixel):
+    """Equidistant: the angle from the axis is the distance from the principal point."""
+    fx, fy, cx, cy = camera.intrinsics
+    place = (pixel - [cx, cy]) / [fx, fy]
+    angle = np.linalg.norm(place, axis=-1, keepdims=True)
+    return np.concatenate([place * np.sinc(angle / np.pi), np.cos(angle)], axis=-1)
+
+
+def fisheye_pixel(camera, direction):
+    fx, fy, cx, cy = camera.intrinsics
+    across = np.linalg.norm(direction[..., :2], axis=-1)
+    scale = np.arctan2(across, direction[..., 2]) / across
+    return direction[..., :2] * scale[..., None] * [fx, fy] + [cx, cy]
+
+
+@pytest.mark.parametrize("projection", ["equirectangular", "fisheye"])
+def test_flow_of_wide_cameras_within_a_ball_in_closed_form(projection):
+    """Nothing is hidden in a ball, and a panorama shows all of it, the short way round."""
+    wide = {"fx": 24.0, "fy": 25.0, "cx": 63.0, "cy": 33.0} if projection == "fisheye" else {}
+    camera = CameraConfig(width=128, height=64, projection=projection, **wide)
+    ray, pixel_of = (fisheye_ray, fisheye_pixel) if wide else (panorama_ray, panorama_pixel)
+    pixel = cell_pixels(camera, camera.width, camera.height)
+    poses = [
+        pose_matrix(rotation_from_rpy(rpy), np.array(position_m))
+        for rpy, position_m in (
+            ([0.1, 0.2, 0.3], [0.5, -0.4, 0.2]),
+            ([-0.2, 0.1, 1.3], [-0.3, 0.2, 0.6]),
+        )
+    ]
+    directions = [ray(camera, pixel) @ pose[:3, :3].T for pose in poses]
+    depths = [
+        sphere_depth_m(pose[:3, 3], direction)
+        for pose, direction in zip(poses, directions, strict=True)
+    ]
+    point_m = poses[0][:3, 3] + depths[0][..., None] * directions[0]
+    expected = pixel_of(camera, (point_m - poses[1][:3, 3]) @ poses[1][:3, :3])
+    offset = expected - pixel
+    if not wide:
+        offset[..., 0] -= camera.width * np.round(offset[..., 0] / camera.width)
+    found = flow_between(camera, depths[0], poses[0], depths[1], poses[1])
+    np.testing.assert_allclose(found.flow_px, offset, atol=1e-3)
+    inside = ((expected >= 0) & (expected <= [camera.width, camera.height])).all(axis=-1)
+    assert 0.2 < inside.mean() <= 1.0
+    np.testing.assert_array_equal(found.state[~inside], State.OUTSIDE)
+    assert (found.state[inside] == State.VISIBLE).mean() > 0.995
+
+
+FACING = CameraConfig(width=64, height=48, fx=80.0, fy=80.0, cx=32.0, cy=24.0)
+WALL_M = 4.0  # a wall across the z axis, along which cameras look
+
+
+def before_wall(place_m, roll_deg=0.0):
+    """A camera that looks straight at the wall, rolled about its axis."""
+    roll = np.radians(roll_deg)
+    turn = np.array(
+        [[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1.0]]
+    )
+    return pose_matrix(turn, np.array(place_m, float))
+
+
+def wall_mm(pose, camera=FACING):
+    """Its depth image in millimetres."""
+    depth_mm = round(1000 * (WALL_M - pose[2, 3]))
+    return np.full((camera.height, camera.width), depth_mm, np.uint16)
+
+
+def write_frames_of_wall(folder, sequences, camera=FACING):
+    """A data set of (split, [(pose, depth in millimetres)]); None: no camera is told."""
+    listed = []
+    for number, (split, frames) in enumerate(sequences, 1):
+        directory = folder / f"seq-{number:02d}"
+        directory.mkdir(parents=True)
+        listed.append(Sequence(directory.name, split, 0, len(frames)))
+        for index, (pose, depth_mm) in enumerate(frames):
+            stem = directory / f"frame-{index:06d}"
+            colour = np.zeros((*depth_mm.shape, 3), np.uint8)
+            stem.with_suffix(".color.png").write_bytes(encode_png(colour))
+            stem.with_suffix(".depth.png").write_bytes(encode_png(depth_mm))
+            stem.with_suffix(".pose.txt").write_text(pose_text(pose))
+    write_splits(folder, listed)
+    if camera is not None:
+        write_json(folder / "manifest.json", {"camera": camera.record})
+    return folder
+
+
+def frames_at(*poses):
+    return [(pose, wall_mm(pose)) for pose in poses]
+
+
+def name(sequence, frame):
+    return f"seq-{sequence:02d}/frame-{frame:06d}.color.png"
+
+
+def test_a_wall_seen_from_half_as_far_in_closed_form(tmp_path):
+    """The nearer frame shows the inner quarter of the farther one; others are turned and apart."""
+    train = before_wall([0, 0, 0]), before_wall([0, 0, 2])
+    test = before_wall([0.3, 0, 1]), before_wall([0, 0.4, 1], roll_deg=10)
+    folder = write_frames_of_wall(
+        tmp_path / "set", [("train", frames_at(*train)), ("test", frames_at(*test))]
+    )
+    out = tmp_path / "pairs"
+    table = synfeal.find_pairs(folder, out, min_overlap=0.0, grid=(8, 6), flow=True)
+    assert table["split_a"].tolist() == table["split_b"].tolist()
+    table = table.set_index("split_a")
+    assert sorted(table.index) == ["test", "train"]
+    row, other = table.loc["train"], table.loc["test"]
+    assert [*row[["image_a", "image_b"]]] == [name(1, 0), name(1, 1)]
+    assert [*other[["image_a", "image_b"]]] == [name(2, 0), name(2, 1)]
+    assert (row["distance_m"], other["distance_m"]) == (pytest.approx(2.0), pytest.approx(0.5))
+    assert row["angle_deg"] == pytest.approx(0.0, abs=1e-6)
+    assert other["angle_deg"] == pytest.approx(10.0)
+    assert (row["overlap_ab"], row["overlap_ba"]) == (0.25, 1.0)
+    for both in ("overlap_ab", "overlap_ba"):  # apart by an eighth and a fifth of the picture
+        assert 0.5 < other[both] < 0.9
+    forth, back = read_flows(out / row["flow"])
+    from_middle = cell_pixels(FACING, FACING.width, FACING.height) - [32.0, 24.0]
+    np.testing.assert_allclose(forth.flow_px, from_middle, atol=1e-4)
+    np.testing.assert_allclose(back.flow_px, -from_middle / 2, atol=1e-4)
+    inner = (np.abs(from_middle) < [16, 12]).all(axis=-1)
+    np.testing.assert_array_equal(forth.state, np.where(inner, State.VISIBLE, State.OUTSIDE))
+    assert (back.state == State.VISIBLE).all()
+
+
+def test_what_is_behind_a_camera_is_outside_and_has_no_flow():
+    ahead = before_wall([0, 0, 0])
+    away = pose_matrix(np.diag([-1.0, 1.0, -1.0]), np.zeros(3))
+    depth_m = wall_mm(ahead) / 1000.0
+    found = flow_between(FACING, depth_m, ahead, depth_m, away)
+    assert (found.state == State.OUTSIDE).all()
+    assert np.isnan(found.flow_px).all()
+
+
+@pytest.mark.parametrize(("tolerance", "overlap_ab"), [(0.02, 0.0), (0.1, 1.0)])
+def test_depths_that_differ_by_five_percent_are_alike_as_far_as_is_told(
+    tmp_path, tolerance, overlap_ab
+):
+    pose = before_wall([0, 0, 0])
+    frames = [(pose, wall_mm(pose)), (pose, np.full_like(wall_mm(pose), 4200))]
+    folder = write_frames_of_wall(tmp_path / "set", [("train", frames)])
+    out = tmp_path / "pairs"
+    table = synfeal.find_pairs(folder, out, min_overlap=0.0, tolerance=tolerance, flow=True)
+    assert table[["overlap_ab", "overlap_ba"]].to_numpy().tolist() == [[overlap_ab] * 2]
+    for flow in read_flows(out / table["flow"][0]):
+        assert (flow.state == (State.VISIBLE if overlap_ab else State.HIDDEN)).all()
+        np.testing.assert_allclose(flow.flow_px, 0.0, atol=1e-4)
+
+
+def test_pixels_without_depth_show_nothing_and_are_not_counted(tmp_path):
+    """Of the left half, in both ways in which a file says so."""
+    pose = before_wall([0, 0, 0])
+    half = wall_mm(pose)
+    half[:24, :32], half[24:, :32] = 0, 65535
+    folder = write_frames_of_wall(
+        tmp_path / "set", [("train", [(pose, half), (pose, wall_mm(pose))])]
+    )
+    out = tmp_path / "pairs"
+    table = synfeal.find_pairs(folder, out, grid=(8, 6), flow=True)
+    assert table[["overlap_ab", "overlap_ba"]].to_numpy().tolist() == [[1.0, 0.5]]
+    forth, back = read_flows(out / table["flow"][0])
+    assert (forth.state[:, :32] == State.NO_DEPTH).all()
+    assert np.isnan(forth.flow_px[:, :32]).all()
+    assert (forth.state[:, 32:] == State.VISIBLE).all()
+    assert (back.state[:, :31] == State.HIDDEN).all()  # at the edge itself both sides are shown
+    assert np.isfinite(back.flow_px).all()
+
+
+def test_every_other_frame_is_that_of_each_sequence_from_its_first(tmp_path):
+    places = [before_wall([0, 0, 0.1 * step]) for step in range(6)]
+    sequences = [("train", frames_at(*places[:3])), ("train", frames_at(*places[3:]))]
+    folder = write_frames_of_wall(tmp_path / "set", sequences)
+    table = synfeal.find_pairs(folder, tmp_path / "pairs", every=2, min_overlap=0.0)
+    images = {*table["image_a"], *table["image_b"]}
+    assert images == {name(1, 0), name(1, 2), name(2, 0), name(2, 2)}
+    assert len(table) == 4 * 3 // 2
+
+
+def test_frames_of_7_scenes_are_compared_by_their_depth_camera(tmp_path, capfd):
+    """Its focal length is 585 pixels; that of colour, of which flow would be, is 525."""
+    size = CameraConfig(width=640, height=480, horizontal_fov_deg=60.0)
+    aside_m = 320 * WALL_M / 585  # by half the picture
+    poses = before_wall([0, 0, 0]), before_wall([aside_m, 0, 0])
+    frames = [(pose, wall_mm(pose, size)) for pose in poses]
+    folder = write_frames_of_wall(tmp_path / "set", [("train", frames)], camera=None)
+    table = synfeal.find_pairs(folder, tmp_path / "pairs", min_overlap=0.0)
+    assert table[["overlap_ab", "overlap_ba"]].to_numpy().tolist() == [[0.5, 0.5]]
+    told = refused(capfd, "pairs", folder, "--out", tmp_path / "flow", "--flow")
+    assert "of another camera" in told
