@@ -1,5 +1,7 @@
 """Rankings by labels against rankings by the truth, made by hand or known in closed form."""
 
+from itertools import combinations
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,7 +12,7 @@ from baselines.config.references import ReferencesConfig
 from reproduction.design.ranking import ranked_sets, rankings
 from reproduction.figures.label_ranking import label_ranking
 from reproduction.report.html.tables import side_html
-from reproduction.statistics.ranking import agreement, pair_orders, tau_b
+from reproduction.statistics.ranking import agreement, pair_orders, sure_order, tau_b
 from reproduction.tables.columns import side_sheet
 from reproduction.tables.label_ranking import (
     THRESHOLDS,
@@ -75,6 +77,56 @@ def test_pairs_are_counted_and_only_sure_ones_are_reversed():
     assert found.reversed == 1  # 1 and 3 are swapped in half of the resamples alone
     assert found.tau == pytest.approx(-2 / np.sqrt(2 * 3))
     assert (found.tau_low, found.tau_high) == pytest.approx((-2 / np.sqrt(6), 1 / 3))
+
+
+def test_pairs_are_those_of_earlier_with_later_methods():
+    orders = pair_orders(np.array([[3.0, 1.0, 1.0], [0.0, np.inf, np.inf]]))
+    np.testing.assert_array_equal(orders, [[1, 1, 0], [-1, -1, 0]])
+
+
+@pytest.mark.parametrize(("agreeing", "sure"), [(39, 1), (38, 0)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_order_is_sure_up_to_one_resample_in_forty(agreeing, sure, sign):
+    """One in forty is what 95 % leave out at each end; what was observed is no resample."""
+    orders = np.zeros((41, 1), np.int8)
+    orders[1 : 1 + agreeing] = sign
+    assert sure_order(orders).tolist() == [sign * sure]
+
+
+@pytest.mark.parametrize("unsure", [None, "labels", "truth"])
+def test_a_pair_is_reversed_where_both_rankings_are_sure(unsure):
+    """A fifth of the resamples order the two methods the other way, by one of the rankings."""
+    rankings = {
+        "labels": np.tile([2.0, 1.0], (1001, 1)),
+        "truth": np.tile([1.0, 2.0], (1001, 1)),
+    }
+    if unsure is not None:
+        rankings[unsure][1:201] = rankings[unsure][1:201, ::-1]
+    found = agreement(rankings["labels"], rankings["truth"])
+    assert (found.swapped, found.reversed) == (1, int(unsure is None))
+
+
+def test_every_pair_is_counted_as_by_hand():
+    rng = np.random.default_rng(4)
+    labels, truth = (
+        np.round(np.sort(rng.uniform(0, 6, 8)) + rng.normal(scale=0.6, size=(201, 8)))
+        for _ in range(2)
+    )
+    labels[:, :4] = labels[:, 3::-1]  # some are the other way round
+    counts = dict.fromkeys(("pairs", "swapped", "tied", "reversed"), 0)
+    for i, j in combinations(range(8), 2):
+        given, true = (np.sign(scores[:, i] - scores[:, j]) for scores in (labels, truth))
+        counts["pairs"] += true[0] != 0
+        counts["swapped"] += given[0] * true[0] < 0
+        counts["tied"] += given[0] == 0 and true[0] != 0
+        counts["reversed"] += any(
+            np.count_nonzero(given[1:] == sign) >= 195
+            and np.count_nonzero(true[1:] == -sign) >= 195
+            for sign in (1, -1)
+        )
+    found = agreement(labels, truth)
+    assert counts == {name: getattr(found, name) for name in counts}
+    assert all(0 < count < 28 for count in counts.values())
 
 
 def test_what_is_not_to_be_ranked_in_a_resample_could_be_anything():

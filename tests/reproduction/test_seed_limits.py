@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import t as student
 
 from reproduction.claims.verdicts import Condition, Verdict, verdict_of
 from reproduction.report.deviations import seed_deviations
@@ -144,6 +145,55 @@ def test_seed_rows_give_the_variance_of_a_mean_and_pool_their_degrees_of_freedom
     assert seed_variance(layout.constant(np.ones(3)), layout)[0] == 0
     with pytest.raises(ValueError, match="are laid out"):
         limits(a[:-1], layout)
+
+
+def test_rows_leave_out_one_run_and_all_else_is_as_observed():
+    layout = Layout(2, (Group(3, 2), Group(2, 1)))
+    runs = [np.array([1.0, 2.0, 3.0]), np.array([3.0, 4.0, 5.0]), np.array([8.0, 9.0, 10.0])]
+    expected = [4, 5, 6, (3 + 8) / 2, (1 + 8) / 2, (1 + 3) / 2, 4, 4]
+    np.testing.assert_allclose(layout.sample(runs, 0), expected)
+    np.testing.assert_allclose(layout.sample(runs[:2], 1), [2, 3, 4, 2, 2, 2, 3, 1])
+    np.testing.assert_array_equal(layout.constant(np.array([7.0, 1.0, 2.0])), [7, 1, 2, *[7] * 5])
+
+
+def test_limits_of_several_conditions_are_those_of_the_textbook():
+    """Student's t with two degrees of freedom at 95 and 99 %, tabulated: 4.3027 and 9.9248."""
+    layout = Layout(4, (Group(3, 2),))
+    sample = layout.sample([np.full(5, value) for value in (1.0, 2.0, 6.0)], 0)
+    error = math.sqrt(7 / 3)  # of the mean of these three
+    for comparisons, quantile in ((1, 4.3027), (5, 9.9248)):
+        expected = 3 - quantile * error, 3 + quantile * error
+        assert limits(sample, layout, comparisons) == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize(("comparisons", "left_out"), [(1, 0.025), (5, 0.005)])
+def test_runs_that_hardly_differ_leave_the_limits_of_the_paths_on_each_side(comparisons, left_out):
+    """The resamples reach from 9 below what was observed to 1 above it, evenly."""
+    layout = Layout(1000, (Group(3, 2),))
+    resampled = np.array([9.0, *np.linspace(0.0, 10.0, 1000)])
+    sample = layout.sample([resampled + step for step in (-1e-6, 0.0, 1e-6)], 0)
+    expected = 10 * left_out, 10 * (1 - left_out)
+    assert limits(sample, layout, comparisons) == pytest.approx(expected, abs=0.02)
+
+
+def test_a_row_that_is_not_a_number_could_be_anything():
+    layout = Layout(4, (Group(3, 2),))
+    sample = layout.sample([np.full(5, value) for value in (1.0, 2.0, 3.0)], 0)
+    sample[-1] = np.nan
+    assert limits(sample, layout) == (-INF, INF)
+
+
+def test_half_widths_between_the_ends_lie_between_those_of_two_rules():
+    """Welch and Satterthwaite's, and Banerjee's, by hand; the first is the narrower one."""
+    for of_paths, seed_error, degrees in ((1.0, 1.0, 2), (2.0, 0.5, 2), (0.5, 1.0, 4)):
+        path_error = of_paths / NORMAL
+        variance = path_error**2 + seed_error**2
+        effective = variance**2 / (seed_error**4 / degrees)
+        welch = student.ppf(0.975, effective) * math.sqrt(variance)
+        banerjee = math.hypot(of_paths, student.ppf(0.975, degrees) * seed_error)
+        found = half_width(of_paths, seed_error, degrees)
+        assert welch < found < banerjee
+        assert found == pytest.approx((welch + banerjee) / 2, rel=0.05)
 
 
 def test_a_failed_run_leaves_its_side_open():
