@@ -16,7 +16,7 @@ from synfeal.dataset.pose_table import PoseTable
 from synfeal.evaluation.metrics import pose_errors
 
 BATCH, PX = 8, 32
-STEPS, FROZEN_STEPS = 60, 120
+STEPS, FROZEN_STEPS = 100, 200
 LEARNING_RATE = 3e-3
 VARIANTS = [
     ("posenet", {}, {}),
