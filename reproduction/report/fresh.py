@@ -98,8 +98,8 @@ def judged_fresh(published: Path = PUBLISHED) -> list[Judged]:
     Args:
         published: Folder of the published runs.
     """
-    found: dict[str, list[Judged]] = {claim.id: [] for claim in claims_to_test()}
     claims = {claim.id: claim for claim in claims_to_test()}
+    found: dict[str, list[Judged]] = {name: [] for name in claims}
     for root in sorted(path.parent for path in published.glob("*/claims.csv")):
         rows = read_published(root)
         if is_fresh(rows):
@@ -145,7 +145,7 @@ def fresh_sentence(published: Path = PUBLISHED) -> str:
 
 
 def _runs(published: Path, judged: Sequence[Judged]) -> str:
-    """Name the runs: commit, seed, training runs per cell."""
+    """Name the runs, each with its seed and commit."""
     texts = []
     for profile in dict.fromkeys(found.profile for found in judged):
         record = read_result(published / profile / "provenance.json", ("commit",), "publish again")
