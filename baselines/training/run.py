@@ -125,7 +125,7 @@ class Material(NamedTuple):
 
 
 class Trained(NamedTuple):
-    """What a training run ends with.
+    """A trained localizer and the history of its training.
 
     Attributes:
         localizer: Localizer as its checkpoint has it, ready for prediction.
