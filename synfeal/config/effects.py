@@ -118,11 +118,21 @@ class RobustnessConfig(Strict):
     made: bool = Field(True, description="make the table, where there are effects")
     scene: Slug = Field("large_room", description="of the data set")
     size: SizeName = Field("6k", description="of the data set")
-    effects: dict[Slug, EffectsConfig] = part(dict, "rows of the table: effects on the test frames")
+    effects: dict[Slug, EffectsConfig] = part(
+        dict, "rows of the table: effects on the test frames; null: not this row"
+    )
     mixed: EffectsConfig = part(EffectsConfig, "effects on the second training set")
     structure_frames: Count = Field(
         250, description="test frames for structure-based poses, spread evenly"
     )
+
+    @field_validator("effects", mode="before")
+    @classmethod
+    def _leave_out(cls, effects: object) -> object:
+        """Drop rows that a profile sets to null; profiles are merged over others key by key."""
+        if not isinstance(effects, dict):
+            return effects
+        return {name: row for name, row in effects.items() if row is not None}
 
     @field_validator("effects")
     @classmethod

@@ -72,6 +72,13 @@ def test_the_shipped_profiles_and_their_designs_load(name):
     assert read_experiments(config)
 
 
+def test_a_profile_leaves_out_an_effect_of_another_by_null(tmp_path):
+    base = set(profile("mini").robustness.effects)
+    file = tmp_path / "fewer.yaml"
+    file.write_text("robustness: {effects: {jpeg_1: null}}")
+    assert set(load_config(CONFIG / "config.yaml", file).robustness.effects) == base - {"jpeg_1"}
+
+
 def test_a_run_is_repeated_as_often_as_any_of_its_tables_asks():
     rows = (
         experiment("table4_size"),
