@@ -1,14 +1,16 @@
-"""Compare the processor time of ``make reproduce``, by part, with that at another commit.
+r"""Compare the processor time of ``make reproduce``, by part, with that at another commit.
 
 Writes ``results/benchmarks/reproduce_cost.csv``::
 
     mkdir before
     git show bdfa7c9:results/published/mini/benchmarks.csv > before/benchmarks.csv
-    python -m benchmarks.reproduce_cost --before before --now results/mini
+    python -m benchmarks.reproduce_cost --before before --before-here sample_before/results/mini \
+      --now results/mini --now-here sample_now/results/mini
 
-The two runs were on different machines, and neither had its machine to itself. Jobs of stages
-whose work has not changed in between tell by how much the one was slower than the other, and all
-processor seconds of the earlier run are multiplied by that.
+The two runs were on different machines, and neither had its machine to itself. So some jobs of both
+commits are repeated side by side on one machine (``--before-here``, ``--now-here``), and the
+processor seconds of every stage of a run are multiplied by what its repeated jobs took here
+relative to there.
 """
 
 from __future__ import annotations
@@ -56,8 +58,6 @@ PARTS = {
 PART_OF = {stage: part for part, stages in PARTS.items() for stage in stages}
 # Processor seconds of version 0.1 on the machine of the other commit's run.
 VERSION_01_S = {"frames": 261.0, "labels": 247.0, "training": 3269.0, REST: 284.0}
-# What these compute, and of how many frames, is the same at both commits.
-UNCHANGED = ["rgbd", "rgbd-toro", "rgbd-g2o"]
 
 
 def part_of(stage: str) -> str:
@@ -65,44 +65,53 @@ def part_of(stage: str) -> str:
     return PART_OF.get(stage, REST)
 
 
-def slower_here(before: pd.DataFrame, now: pd.DataFrame) -> float:
-    """Return how many times the processor seconds unchanged work took in the run now.
+def as_if_here(run: pd.DataFrame, repeated: pd.DataFrame) -> pd.DataFrame:
+    """Scale the processor seconds of a run to those on the machine where some jobs were repeated.
 
     Args:
-        before: Jobs of the other commit's run, with ``stage``, ``job`` and ``cpu_s``.
-        now: Jobs of the run now.
+        run: Jobs of the run, with ``stage``, ``job`` and ``cpu_s``.
+        repeated: The same of the repeated jobs. A stage that has none of them is scaled as all
+            repeated jobs together.
+
+    Returns:
+        The jobs of the run, with ``here_cpu_s`` and ``repeated``, whether the job was repeated.
 
     Raises:
-        InputError: no job of unchanged work is in both.
+        InputError: no repeated job is one of the run's.
     """
-    both = before.merge(now, on=["stage", "job"], suffixes=("_before", "_now"))
-    same = both[both["stage"].isin(UNCHANGED)]
-    if same.empty:
-        raise InputError(f"the runs have no jobs of {', '.join(UNCHANGED)} in common")
-    return float(same["cpu_s_now"].sum() / same["cpu_s_before"].sum())
+    both = run.merge(repeated, on=["stage", "job"], suffixes=("", "_here"))
+    if both.empty:
+        raise InputError("none of the repeated jobs is one of the run's; repeat jobs of that run")
+    seconds = both.groupby("stage")[["cpu_s", "cpu_s_here"]].sum()
+    usual = seconds["cpu_s_here"].sum() / seconds["cpu_s"].sum()
+    slower = run["stage"].map(seconds["cpu_s_here"] / seconds["cpu_s"]).fillna(usual)
+    keys = ["stage", "job"]
+    again = pd.MultiIndex.from_frame(run[keys]).isin(pd.MultiIndex.from_frame(both[keys]))
+    return run.assign(here_cpu_s=run["cpu_s"] * slower, repeated=again)
 
 
 def cost_by_part(before: pd.DataFrame, now: pd.DataFrame) -> pd.DataFrame:
-    """Add up jobs and processor seconds of two runs by part; of ``before`` also as if it ran here.
+    """Add up jobs and processor seconds of two runs by part.
 
     Args:
-        before: Jobs of the other commit's run, with ``stage``, ``job`` and ``cpu_s``.
-        now: Jobs of the run now.
+        before: Jobs of the other commit's run, as :func:`as_if_here` returns them.
+        now: Jobs of the run now, likewise.
     """
-    factor = slower_here(before, now)
+    factor = before["here_cpu_s"].sum() / before["cpu_s"].sum()
     rows = []
     for part in (*PARTS, REST):
-        there = before.loc[before["stage"].map(part_of) == part, "cpu_s"]
-        here = now.loc[now["stage"].map(part_of) == part, "cpu_s"]
+        there = before[before["stage"].map(part_of) == part]
+        here = now[now["stage"].map(part_of) == part]
         rows.append(
             {
                 "part": part,
                 "version_01_cpu_s": VERSION_01_S.get(part, 0.0) * factor,
                 "before_jobs": len(there),
-                "before_cpu_s_there": there.sum(),
-                "before_cpu_s": there.sum() * factor,
+                "before_repeated": there["repeated"].sum(),
+                "before_cpu_s": there["here_cpu_s"].sum(),
                 "jobs": len(here),
-                "cpu_s": here.sum(),
+                "repeated": here["repeated"].sum(),
+                "cpu_s": here["here_cpu_s"].sum(),
             }
         )
     table = pd.DataFrame(rows)
@@ -116,9 +125,11 @@ def text_of(table: pd.DataFrame) -> str:
     shown = pd.DataFrame(
         {
             "part": table["part"],
-            "jobs": table["jobs"].map("{:.0f}".format),
+            "jobs (repeated)": _counted(table["jobs"], table["repeated"]),
             "processor seconds": table["cpu_s"].map("{:,.0f}".format),
-            "at `bdfa7c9`: jobs": table["before_jobs"].map("{:.0f}".format),
+            "at `bdfa7c9`: jobs (repeated)": _counted(
+                table["before_jobs"], table["before_repeated"]
+            ),
             "seconds": table["before_cpu_s"].map("{:,.0f}".format),
             "ratio": table["ratio"].map("{:.2f}".format),
         }
@@ -126,15 +137,20 @@ def text_of(table: pd.DataFrame) -> str:
     return str(shown.to_markdown(index=False, disable_numparse=True))
 
 
+def _counted(jobs: pd.Series, repeated: pd.Series) -> list[str]:
+    return [f"{total:.0f} ({some:.0f})" for total, some in zip(jobs, repeated, strict=True)]
+
+
 def run(options: argparse.Namespace) -> None:
     """Write the table, and print it in Markdown."""
-    before, now = read_measured(options.before), read_measured(options.now)
+    before = as_if_here(read_measured(options.before), read_measured(options.before_here))
+    now = as_if_here(read_measured(options.now), read_measured(options.now_here))
     table = cost_by_part(before, now)
     seconds = [name for name in table if "cpu_s" in str(name)]
-    whole = ["before_jobs", "jobs", *seconds]
+    whole = ["before_jobs", "before_repeated", "jobs", "repeated", *seconds]
     table = table.round(dict.fromkeys(seconds, 0) | {"ratio": 3}).astype(dict.fromkeys(whole, int))
     write_frame(options.out, table, float_format=None)
-    print(f"slower here: {slower_here(before, now):.3f} times", text_of(table), sep="\n\n")
+    print(text_of(table))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -142,6 +158,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.reproduce_cost")
     parser.add_argument("--before", type=Path, required=True, help="results of the other commit")
     parser.add_argument("--now", type=Path, default=Path("results/published/mini"))
+    for name, whose in (("before", "the other commit's"), ("now", "this commit's")):
+        parser.add_argument(
+            f"--{name}-here", type=Path, required=True, help=f"{whose} jobs repeated on one machine"
+        )
     out = Path("results/benchmarks/reproduce_cost.csv")
     parser.add_argument("--out", type=Path, default=out)
     options = parser.parse_args(arguments)

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from benchmarks.reproduce_cost import PART_OF, REST, cost_by_part, part_of
+from benchmarks.reproduce_cost import PART_OF, REST, as_if_here, cost_by_part, part_of
 from reproduction.plan.pace import PUBLISHED
 from reproduction.runs.job_times import read_measured
 from synfeal.errors import InputError
@@ -17,28 +17,31 @@ def jobs(*rows):
     return pd.DataFrame(rows, columns=["stage", "job", "cpu_s"])
 
 
-def test_seconds_of_another_machine_are_scaled_by_work_that_is_the_same():
-    """The machine here takes 1.5 times as long for the two batches that both runs have."""
+def test_seconds_of_a_stage_are_scaled_by_its_repeated_jobs():
+    """Training takes 1.5 times as long here, batches 3 times; others as all of these together."""
+    run = jobs(("train", "a", 100.0), ("train", "b", 300.0), ("rgbd", "1", 20.0), ("plan", "x", 8))
+    repeated = jobs(("train", "a", 150.0), ("rgbd", "1", 60.0), ("rgbd", "2", 1000.0))
+    found = as_if_here(run, repeated)
+    assert found.here_cpu_s.tolist() == pytest.approx([150.0, 450.0, 60.0, 8 * 210 / 120])
+    assert found.repeated.tolist() == [True, False, True, False]
+
+
+def test_parts_of_two_runs_add_up_to_one_ratio():
     before = jobs(
-        ("train", "a", 100.0),
-        ("train", "b", 300.0),
-        ("rgbd", "1", 10.0),
-        ("rgbd", "2", 30.0),
-        ("rgbd", "3", 20.0),
-        ("score", "a", 2.0),
+        ("train", "a", 100.0), ("train", "b", 300.0), ("rgbd", "1", 50.0), ("score", "a", 2)
     )
-    now = jobs(("train", "a", 240.0), ("rgbd", "1", 20.0), ("rgbd", "2", 40.0))
-    table = cost_by_part(before, now).set_index("part")
-    assert table.before_cpu_s["training"] == pytest.approx(603.0)
-    assert table.before_jobs["training"] == 3
-    assert table.ratio["training"] == pytest.approx(240.0 / 603.0)
-    assert table.before_cpu_s["labels"] == pytest.approx(90.0)
-    assert table.ratio["all"] == pytest.approx(300.0 / 693.0)
+    now = jobs(("train", "a", 200.0), ("rgbd", "1", 20.0))
+    twice = before[before["stage"] == "train"].assign(cpu_s=lambda run: run["cpu_s"] * 2)
+    table = cost_by_part(as_if_here(before, twice), as_if_here(now, now)).set_index("part")
+    assert table.before_cpu_s["training"] == pytest.approx(804.0)
+    assert (table.before_jobs["training"], table.before_repeated["training"]) == (3, 2)
+    assert table.ratio["training"] == pytest.approx(200.0 / 804.0)
+    assert table.ratio["all"] == pytest.approx(220.0 / 904.0)
 
 
-def test_runs_without_common_work_are_refused():
-    with pytest.raises(InputError, match="no jobs of rgbd"):
-        cost_by_part(jobs(("train", "a", 1.0)), jobs(("train", "a", 1.0)))
+def test_repeated_jobs_of_another_run_are_refused():
+    with pytest.raises(InputError, match="repeat jobs of that run"):
+        as_if_here(jobs(("train", "a", 1.0)), jobs(("train", "b", 1.0)))
 
 
 def test_every_stage_of_a_plan_belongs_to_a_part():
