@@ -44,6 +44,7 @@ def lined_room():
     return Room(tuple(boxes), plain=True)
 
 
+@pytest.mark.slow
 def test_a_batch_as_long_as_the_papers_is_tracked_to_its_end(tmp_path):
     """250 frames 3 cm apart that look once all around: 7.5 m, within one and a half voxels."""
     turn = np.linspace(0, 2 * np.pi, 251)

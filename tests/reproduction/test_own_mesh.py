@@ -104,6 +104,7 @@ def test_the_file_on_the_page_is_short_and_its_dry_run_lists_the_jobs_of_one_row
     assert not [job for job in jobs if "large_room" in job or "varied" in job or "effects" in job]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("table", ROWS)
 def test_a_design_of_one_table_plans_that_table_alone(table, tmp_path):
     """Each of the other tables is empty, and those of estimated labels but with Table 2."""

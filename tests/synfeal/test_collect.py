@@ -55,6 +55,7 @@ def test_the_same_command_gives_the_same_bytes(mesh, calm, tmp_path, more):
     assert tree_of(tmp_path / "set") == tree_of(calm)
 
 
+@pytest.mark.slow
 def test_the_workflow_makes_the_same_bytes_from_the_printed_configuration(
     mesh, calm, tmp_path, capsys
 ):

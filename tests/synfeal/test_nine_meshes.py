@@ -223,6 +223,7 @@ def explained_by_holes(mesh, n_paths):
     return float(shares.mean() + 3.0 * shares.std() / np.sqrt(n_paths))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", MESHES.values(), ids=MESHES)
 def test_from_a_mesh_to_a_data_set_without_help(make, tmp_path, capsys):
     mesh = make(tmp_path)
