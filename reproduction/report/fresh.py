@@ -50,7 +50,7 @@ RUNS = (
     JudgingRun("dose", ("C5", "C6")),
     JudgingRun("controls", ("C7", "C8", "C10", "C11", "C12")),
     JudgingRun("night", ("C13",), "table7_images_shown"),
-    JudgingRun("night", ("C15",), "table2_ground_truth"),
+    JudgingRun("tracking", ("C15",)),
 )
 
 
