@@ -10,7 +10,9 @@ Writes ``results/benchmarks/reproduce_cost.csv``::
 The two runs were on different machines, and neither had its machine to itself. So some jobs of both
 commits are repeated side by side on one machine (``--before-here``, ``--now-here``), and the
 processor seconds of every stage of a run are multiplied by what its repeated jobs took here
-relative to there.
+relative to there. Repeat jobs with the settings of their run: one of the same name counts as the
+same work. Leave out of ``now`` what the present commit no longer runs; the published table is of
+``results/published/mini`` without the 41 jobs that have KinectFusion in stage or name.
 """
 
 from __future__ import annotations
