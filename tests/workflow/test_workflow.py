@@ -85,7 +85,7 @@ def test_a_single_experiment_is_a_target(tmp_path):
     assert "sfm" not in jobs
     assert "pretrain" not in jobs
     # Only what one scene's network frames need: no image files, no frames for reconstruction.
-    assert jobs["render_packed"] == (20_000 + 5_000) / 2500
+    assert jobs["render_packed"] == 20_000 / 10_000 + 1
     assert "render" not in jobs
 
 
