@@ -28,7 +28,7 @@ from synfeal.records.timing import seconds_of
 
 SMALLEST = 100
 N_BISECTIONS = 4  # between two rungs, a factor of 2: the count is then settled to 4 %
-N_TIMINGS = 9
+N_TIMINGS = 3
 
 log = logging.getLogger("synfeal")
 
@@ -50,6 +50,15 @@ class Rung:
 
 
 CURVE_HEADER = ",".join(field.name for field in fields(Rung))
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The full mesh, and what a planner is told on it."""
+
+    caster: RayCaster
+    questions: Questions
+    answers: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -108,10 +117,11 @@ def search(full: Triangles, questions: Questions, min_agreement: float) -> list[
         All meshes that were measured, from the full one to the smallest; ``chosen`` is 1 in the
         rung of the smallest that agrees, as all larger ones do.
     """
-    reference = RayCaster(*full)
-    trials = [measure(full, reference, questions, 0.0)]
+    caster = RayCaster(*full)
+    reference = Reference(caster, questions, questions.answers(caster))
+    trials = [measure(full, reference, 0.0)]
     for n_faces in ladder(len(full.faces)):
-        smaller = next_trial(trials[-1], n_faces, reference, questions)
+        smaller = next_trial(trials[-1], n_faces, reference)
         if smaller.rung.faces == trials[-1].rung.faces:  # no edge is left that may collapse
             break
         trials.append(smaller)
@@ -120,7 +130,7 @@ def search(full: Triangles, questions: Questions, min_agreement: float) -> list[
         if last + 1 == len(trials):
             break
         between = np.sqrt(trials[last].rung.faces * trials[last + 1].rung.faces)
-        trials.insert(last + 1, next_trial(trials[last], round(between), reference, questions))
+        trials.insert(last + 1, next_trial(trials[last], round(between), reference))
     chosen = last_agreeing([trial.rung for trial in trials], min_agreement)
     trials[chosen] = Trial(trials[chosen].mesh, replace(trials[chosen].rung, chosen=1))
     return trials
@@ -140,35 +150,33 @@ def last_agreeing(rungs: Sequence[Rung], min_agreement: float) -> int:
     return agree.index(False) - 1 if False in agree else len(rungs) - 1
 
 
-def next_trial(larger: Trial, n_faces: int, reference: RayCaster, questions: Questions) -> Trial:
+def next_trial(larger: Trial, n_faces: int, reference: Reference) -> Trial:
     """Simplify a mesh further and measure the result.
 
     Args:
         larger: Trial whose mesh is simplified.
         n_faces: Number of triangles to reach.
-        reference: Rays against the full mesh.
-        questions: Questions that both meshes answer.
+        reference: The full mesh and its answers.
     """
     begin = time.perf_counter()
     mesh = simplify(larger.mesh, n_faces)
     build_s = larger.rung.build_s + time.perf_counter() - begin
-    return measure(mesh, reference, questions, build_s)
+    return measure(mesh, reference, build_s)
 
 
-def measure(mesh: Triangles, reference: RayCaster, questions: Questions, build_s: float) -> Trial:
+def measure(mesh: Triangles, reference: Reference, build_s: float) -> Trial:
     """Compare the answers of a mesh with those of the full one, and their speed.
 
     Args:
         mesh: Mesh to judge.
-        reference: Rays against the full mesh.
-        questions: Questions that both answer.
+        reference: The full mesh and its answers.
         build_s: Seconds that simplifying it took.
     """
-    caster = RayCaster(*mesh)
-    expected, found = questions.answers(reference), questions.answers(caster)
+    caster, expected = RayCaster(*mesh), reference.answers
+    found = reference.questions.answers(caster)
     n_equal = int(np.sum(expected == found))
     limits = binomtest(n_equal, len(expected)).proportion_ci(0.95, method="wilson")
-    speed, full_speed = rays_per_s(questions, caster, reference)
+    speed, full_speed = rays_per_s(reference.questions, caster, reference.caster)
     rung = Rung(
         faces=len(mesh.faces),
         agreement=n_equal / len(expected),
