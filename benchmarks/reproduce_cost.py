@@ -5,14 +5,14 @@ Writes ``results/benchmarks/reproduce_cost.csv``::
     mkdir before
     git show bdfa7c9:results/published/mini/benchmarks.csv > before/benchmarks.csv
     python -m benchmarks.reproduce_cost --before before --before-here sample_before/results/mini \
-      --now results/mini --now-here sample_now/results/mini
+      --now results/mini
 
-The two runs were on different machines, and neither had its machine to itself. So some jobs of both
-commits are repeated side by side on one machine (``--before-here``, ``--now-here``), and the
+Where the two runs were on different machines, some jobs of the other commit are repeated on the
+machine of the run now (``--before-here``), or some of both on a third (``--now-here``), and the
 processor seconds of every stage of a run are multiplied by what its repeated jobs took here
 relative to there. Repeat jobs with the settings of their run: one of the same name counts as the
-same work. Leave out of ``now`` what the present commit no longer runs; the published table is of
-``results/published/mini`` without the 41 jobs that have KinectFusion in stage or name.
+same work. ``--kept TABLE`` in place of ``--before`` compares another run now with the columns of
+the other commit in an earlier table.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import pandas as pd
 from baselines.labels.methods import frame_methods, graph_methods
 from reproduction.runs.job_times import read_measured
 from synfeal.errors import InputError, exit_status
-from synfeal.records.tables import write_frame
+from synfeal.records.tables import COUNT, NUMBER, TEXT, read_frame, write_frame
 
 REST = "scenes, plans, evidence"
 PARTS = {
@@ -60,6 +60,13 @@ PARTS = {
 PART_OF = {stage: part for part, stages in PARTS.items() for stage in stages}
 # Processor seconds of version 0.1 on the machine of the other commit's run.
 VERSION_01_S = {"frames": 261.0, "labels": 247.0, "training": 3269.0, REST: 284.0}
+BEFORE = {
+    "part": TEXT,
+    "version_01_cpu_s": NUMBER,
+    "before_jobs": COUNT,
+    "before_repeated": COUNT,
+    "before_cpu_s": NUMBER,
+}
 
 
 def part_of(stage: str) -> str:
@@ -92,33 +99,45 @@ def as_if_here(run: pd.DataFrame, repeated: pd.DataFrame) -> pd.DataFrame:
     return run.assign(here_cpu_s=run["cpu_s"] * slower, repeated=again)
 
 
-def cost_by_part(before: pd.DataFrame, now: pd.DataFrame) -> pd.DataFrame:
-    """Add up jobs and processor seconds of two runs by part.
+def cost_by_part(run: pd.DataFrame) -> pd.DataFrame:
+    """Add up jobs and processor seconds of a run by part.
 
     Args:
-        before: Jobs of the other commit's run, as :func:`as_if_here` returns them.
-        now: Jobs of the run now, likewise.
+        run: Jobs as :func:`as_if_here` returns them.
+
+    Returns:
+        A row for each part and one for all, with ``jobs``, ``repeated`` and ``cpu_s``.
     """
-    factor = before["here_cpu_s"].sum() / before["cpu_s"].sum()
+    parts = run["stage"].map(part_of)
     rows = []
-    for part in (*PARTS, REST):
-        there = before[before["stage"].map(part_of) == part]
-        here = now[now["stage"].map(part_of) == part]
-        rows.append(
-            {
-                "part": part,
-                "version_01_cpu_s": VERSION_01_S.get(part, 0.0) * factor,
-                "before_jobs": len(there),
-                "before_repeated": there["repeated"].sum(),
-                "before_cpu_s": there["here_cpu_s"].sum(),
-                "jobs": len(here),
-                "repeated": here["repeated"].sum(),
-                "cpu_s": here["here_cpu_s"].sum(),
-            }
-        )
-    table = pd.DataFrame(rows)
-    total = table.drop(columns="part").sum()
-    table = pd.concat([table, pd.DataFrame([{"part": "all", **total}])], ignore_index=True)
+    for part in (*PARTS, REST, "all"):
+        own = run if part == "all" else run[parts == part]
+        sums = {"jobs": len(own), "repeated": own["repeated"].sum()}
+        rows.append({"part": part, **sums, "cpu_s": own["here_cpu_s"].sum()})
+    return pd.DataFrame(rows)
+
+
+def costs_before(before: pd.DataFrame) -> pd.DataFrame:
+    """Add up the other commit's run by part, and put the seconds of version 0.1 beside it.
+
+    Args:
+        before: Jobs as :func:`as_if_here` returns them.
+    """
+    here = cost_by_part(before).set_index("part")
+    factor = before["here_cpu_s"].sum() / before["cpu_s"].sum()
+    first = pd.Series(VERSION_01_S).reindex(here.index, fill_value=0.0) * factor
+    first["all"] = first.sum()
+    return here.add_prefix("before_").assign(version_01_cpu_s=first).reset_index()[[*BEFORE]]
+
+
+def compared(before: pd.DataFrame, now: pd.DataFrame) -> pd.DataFrame:
+    """Put the costs of two runs side by side.
+
+    Args:
+        before: Columns ``BEFORE`` of every part.
+        now: Costs by part.
+    """
+    table = before.merge(now, on="part", validate="one_to_one")
     return table.assign(ratio=table["cpu_s"] / table["before_cpu_s"])
 
 
@@ -145,9 +164,15 @@ def _counted(jobs: pd.Series, repeated: pd.Series) -> list[str]:
 
 def run(options: argparse.Namespace) -> None:
     """Write the table, and print it in Markdown."""
-    before = as_if_here(read_measured(options.before), read_measured(options.before_here))
-    now = as_if_here(read_measured(options.now), read_measured(options.now_here))
-    table = cost_by_part(before, now)
+    if options.kept:
+        before = read_frame(options.kept, BEFORE, "give a table of this command")
+    else:
+        run_before = read_measured(options.before)
+        here = read_measured(options.before_here) if options.before_here else run_before
+        before = costs_before(as_if_here(run_before, here))
+    run_now = read_measured(options.now)
+    here = read_measured(options.now_here) if options.now_here else run_now
+    table = compared(before, cost_by_part(as_if_here(run_now, here)))
     seconds = [name for name in table if "cpu_s" in str(name)]
     whole = ["before_jobs", "before_repeated", "jobs", "repeated", *seconds]
     table = table.round(dict.fromkeys(seconds, 0) | {"ratio": 3}).astype(dict.fromkeys(whole, int))
@@ -158,11 +183,13 @@ def run(options: argparse.Namespace) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return 0, or 1 after ``error: ...`` for what a person can put right."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.reproduce_cost")
-    parser.add_argument("--before", type=Path, required=True, help="results of the other commit")
+    other = parser.add_mutually_exclusive_group(required=True)
+    other.add_argument("--before", type=Path, help="results of the other commit")
+    other.add_argument("--kept", type=Path, help="earlier table with its columns")
     parser.add_argument("--now", type=Path, default=Path("results/published/mini"))
     for name, whose in (("before", "the other commit's"), ("now", "this commit's")):
         parser.add_argument(
-            f"--{name}-here", type=Path, required=True, help=f"{whose} jobs repeated on one machine"
+            f"--{name}-here", type=Path, help=f"{whose} jobs repeated here; none: the run was here"
         )
     out = Path("results/benchmarks/reproduce_cost.csv")
     parser.add_argument("--out", type=Path, default=out)

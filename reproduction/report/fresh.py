@@ -36,20 +36,19 @@ class JudgingRun(NamedTuple):
 
     Attributes:
         profile: Name of its profile, ``config/<profile>.yaml``.
-        claims: Claims it has the rows for.
-        plan: Row of ``results/benchmarks/plan_<profile>.csv`` with its cost.
+        claims: Claims it is for; it may have the rows of others.
     """
 
     profile: str
     claims: tuple[str, ...]
-    plan: str = "total"
 
 
 RUNS = (
     JudgingRun("labels", ("C1", "C2", "C3", "C4", "C6")),
     JudgingRun("dose", ("C5", "C6")),
-    JudgingRun("controls", ("C7", "C8", "C10", "C11", "C12")),
-    JudgingRun("night", ("C13",), "table7_images_shown"),
+    JudgingRun("controls", ("C7", "C11", "C12")),
+    JudgingRun("sanctuary", ("C8",)),
+    JudgingRun("transfer", ("C10", "C13")),
     JudgingRun("tracking", ("C15",)),
 )
 
@@ -167,9 +166,8 @@ def _open(judged: Sequence[Judged]) -> str:
         left = [claim for claim in run.claims if claim not in decided]
         if left and not _was_run(run, judged):
             items.append(
-                f"- {', '.join(left)}: profile `{run.profile}`"
-                f"{'' if run.plan == 'total' else f', table `{run.plan}`, with another seed'},"
-                f" planned at {planned_hours(run):.1f} hours of processor time"
+                f"- {', '.join(left)}: profile `{run.profile}`, planned at"
+                f" {planned_hours(run):.1f} hours of processor time"
                 f" ([plan](../results/benchmarks/plan_{run.profile}.csv))."
             )
     return "\n".join(["What would decide the others:", "", *items]) if items else ""
@@ -187,7 +185,7 @@ def planned_hours(run: JudgingRun, folder: Path = RESULTS / "benchmarks") -> flo
     """
     path = folder / f"plan_{run.profile}.csv"
     costs = read_frame(path, {"name": TEXT, "cpu_s": MAYBE}, "make plan")
-    own = costs[costs.name == run.plan]
+    own = costs[costs.name == "total"]
     if own.empty:
-        raise InputError(f"{path}: has no row '{run.plan}'; make plan")
+        raise InputError(f"{path}: has no row 'total'; make plan")
     return float(own.cpu_s.iloc[0]) / 3600

@@ -1,9 +1,21 @@
 """`python -m benchmarks.reproduce_cost`: two runs on two machines become one ratio."""
 
+import shutil
+
 import pandas as pd
 import pytest
 
-from benchmarks.reproduce_cost import PART_OF, REST, as_if_here, cost_by_part, part_of
+from benchmarks.reproduce_cost import (
+    PART_OF,
+    REST,
+    VERSION_01_S,
+    as_if_here,
+    compared,
+    cost_by_part,
+    costs_before,
+    main,
+    part_of,
+)
 from reproduction.plan.pace import PUBLISHED
 from reproduction.runs.job_times import read_measured
 from synfeal.errors import InputError
@@ -32,11 +44,29 @@ def test_parts_of_two_runs_add_up_to_one_ratio():
     )
     now = jobs(("train", "a", 200.0), ("rgbd", "1", 20.0))
     twice = before[before["stage"] == "train"].assign(cpu_s=lambda run: run["cpu_s"] * 2)
-    table = cost_by_part(as_if_here(before, twice), as_if_here(now, now)).set_index("part")
+    costs = cost_by_part(as_if_here(now, now))
+    table = compared(costs_before(as_if_here(before, twice)), costs).set_index("part")
     assert table.before_cpu_s["training"] == pytest.approx(804.0)
     assert (table.before_jobs["training"], table.before_repeated["training"]) == (3, 2)
     assert table.ratio["training"] == pytest.approx(200.0 / 804.0)
     assert table.ratio["all"] == pytest.approx(220.0 / 904.0)
+    # Version 0.1 was timed where the run before was, and is slower here as it is.
+    assert table.version_01_cpu_s["all"] / sum(VERSION_01_S.values()) == pytest.approx(
+        904.0 / 452.0
+    )
+
+
+def test_another_run_is_compared_with_a_table_made_before(tmp_path):
+    table = tmp_path / "before.csv"
+    shutil.copy(ROOT / "results/benchmarks/reproduce_cost.csv", table)
+    earlier = pd.read_csv(table).set_index("part")
+    run, out = ROOT / "results/published/mini", tmp_path / "out.csv"
+    assert main(["--kept", str(table), "--now", str(run), "--out", str(out)]) == 0
+    found = pd.read_csv(out).set_index("part")
+    assert found.before_cpu_s.equals(earlier.before_cpu_s)
+    measured = read_measured(run)["cpu_s"].sum()
+    assert found.cpu_s["all"] == pytest.approx(measured, abs=1)
+    assert found.ratio["all"] == pytest.approx(measured / earlier.before_cpu_s["all"], abs=1e-3)
 
 
 def test_repeated_jobs_of_another_run_are_refused():
