@@ -62,7 +62,7 @@ plan: smoke  ## what paper costs, and what such plans are worth (results/benchma
 test: check  ## static checks and the test suite, but for what is slow, on CORES cores
 	$(PYTEST) -m "not slow"
 
-test-all: check  ## the same with what is slow, as continuous integration runs it
+test-all: check  ## the same with what is slow, as continuous integration runs it once a week
 	$(PYTEST)
 
 test-slurm: $(SLURM_INSTALLED)  ## the smoke profile here and through a SLURM cluster of one node, which is killed
