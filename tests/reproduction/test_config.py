@@ -10,6 +10,7 @@ import yaml
 from reproduction.config.load import load_config, parse_config
 from reproduction.design.docs import main
 from reproduction.design.experiments import Design, Run, read_design, read_experiments
+from reproduction.report.fresh import RUNS
 from synfeal.config.load import merge, read_yaml
 from synfeal.errors import InputError
 from synfeal.records.provenance import config_hash
@@ -133,21 +134,31 @@ def test_a_run_of_one_table_leaves_out_further_scenes_that_it_has_no_rows_of():
         read_design(config.model_copy(update=wrong))
 
 
-def test_controls_show_small_sets_as_many_images_and_large_ones_every_frame_twice():
+@pytest.mark.parametrize(
+    ("profile", "scene", "largest"),
+    [("controls", "large_room", "80k"), ("sanctuary", "sanctuary", "95k")],
+)
+def test_controls_show_small_sets_as_many_images_and_large_ones_every_frame_twice(
+    profile, scene, largest
+):
     night, controls = (
-        load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml")
-        for name in ("night", "controls")
+        load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml") for name in ("night", profile)
     )
     shown = controls.training.samples_seen
-    assert shown["6k"] == shown["20k"] == night.training.samples_seen["80k"]
+    assert shown["6k"] == shown["20k"] == night.training.samples_seen[largest]
     learnt = 1 - controls.training.validation_share
-    design = read_design(controls)
-    for scene, size in (("large_room", "80k"), ("sanctuary", "95k")):
-        assert shown[size] >= 2 * learnt * controls.n_frames(scene, size, "train")
+    assert shown[largest] >= 2 * learnt * controls.n_frames(scene, largest, "train")
     # Fresh seeds: nothing is drawn as in night.
+    design = read_design(controls)
     assert all(run.seed(controls.seed) != run.seed(night.seed) for run in design.runs)
-    assert min(map(len, (design.runs_of(row, "posenet") for row in design.rows))) == 3
-    assert {row.scene for row in design.rows} == {"large_room", "sanctuary"}
+    assert {row.scene for row in design.rows} == {scene}
+
+
+def test_no_two_fresh_runs_share_a_seed():
+    seeds = [
+        load_config(CONFIG / "config.yaml", CONFIG / f"{run.profile}.yaml").seed for run in RUNS
+    ]
+    assert len({*seeds, 0}) == len(seeds) + 1
 
 
 def test_the_codes_dose_is_tried_on_nights_table_3_with_fresh_seeds():
