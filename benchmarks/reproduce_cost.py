@@ -4,8 +4,7 @@ Writes ``results/benchmarks/reproduce_cost.csv``::
 
     mkdir before
     git show bdfa7c9:results/published/mini/benchmarks.csv > before/benchmarks.csv
-    python -m benchmarks.reproduce_cost --before before --before-here sample_before/results/mini \
-      --now results/mini
+    python -m benchmarks.reproduce_cost --before before --before-here sample_before/results/mini
 
 Where the two runs were on different machines, some jobs of the other commit are repeated on the
 machine of the run now (``--before-here``), or some of both on a third (``--now-here``), and the
@@ -142,7 +141,7 @@ def compared(before: pd.DataFrame, now: pd.DataFrame) -> pd.DataFrame:
 
 
 def text_of(table: pd.DataFrame) -> str:
-    """Return the table in Markdown, as docs/cost.md has it."""
+    """Return the table in Markdown."""
     shown = pd.DataFrame(
         {
             "part": table["part"],
@@ -162,17 +161,19 @@ def _counted(jobs: pd.Series, repeated: pd.Series) -> list[str]:
     return [f"{total:.0f} ({some:.0f})" for total, some in zip(jobs, repeated, strict=True)]
 
 
+def _read_as_if_here(run: Path, repeated: Path | None) -> pd.DataFrame:
+    """Read a run, and scale it by its repeated jobs unless it was made here."""
+    return as_if_here(read_measured(run), read_measured(repeated or run))
+
+
 def run(options: argparse.Namespace) -> None:
     """Write the table, and print it in Markdown."""
     if options.kept:
         before = read_frame(options.kept, BEFORE, "give a table of this command")
     else:
-        run_before = read_measured(options.before)
-        here = read_measured(options.before_here) if options.before_here else run_before
-        before = costs_before(as_if_here(run_before, here))
-    run_now = read_measured(options.now)
-    here = read_measured(options.now_here) if options.now_here else run_now
-    table = compared(before, cost_by_part(as_if_here(run_now, here)))
+        before = costs_before(_read_as_if_here(options.before, options.before_here))
+    now = _read_as_if_here(options.now, options.now_here)
+    table = compared(before, cost_by_part(now))
     seconds = [name for name in table if "cpu_s" in str(name)]
     whole = ["before_jobs", "before_repeated", "jobs", "repeated", *seconds]
     table = table.round(dict.fromkeys(seconds, 0) | {"ratio": 3}).astype(dict.fromkeys(whole, int))

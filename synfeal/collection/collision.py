@@ -54,7 +54,7 @@ CURVE_HEADER = ",".join(field.name for field in fields(Rung))
 
 @dataclass(frozen=True)
 class Reference:
-    """The full mesh, and what a planner is told on it."""
+    """The full mesh, the questions a planner asks of it, and its answers."""
 
     caster: RayCaster
     questions: Questions

@@ -89,6 +89,15 @@ def test_a_page_names_run_seed_verdicts_and_what_is_open(tmp_path, monkeypatch):
     assert "What would decide" not in fresh_claims(tmp_path)
 
 
+# Table that a claim is about.
+TABLES = {
+    "C1": "table2_ground_truth",
+    "C5": "table3_inconsistencies",
+    "C6": "table3_inconsistencies",
+    "C7": "table4_size",
+    "C10": "table5_from_scratch",
+    "C13": "table7_images_shown",
+}
 # Data set and start of the cells that a claim is judged by. C7 and C8 compare the smallest set with
 # the largest, but also report how errors rank over all four.
 SIZES = ("6k", "20k", "40k", "80k")
@@ -111,7 +120,9 @@ def test_each_open_claim_has_a_run_with_the_rows_it_is_judged_by():
     assert {claim for run in RUNS for claim in run.claims} == {c.id for c in claims_to_test()}
     for run in RUNS:
         config = load_config(CONFIG / "config.yaml", CONFIG / f"{run.profile}.yaml")
-        cells = {(made.scene, made.size, made.init) for made in read_design(config).runs}
+        design = read_design(config)
+        assert {TABLES[claim] for claim in run.claims if claim in TABLES} <= {*design.tables}
+        cells = {(made.scene, made.size, made.init) for made in design.runs}
         for claim in run.claims:
             assert JUDGED_BY.get(claim, set()) <= cells, (run.profile, claim)
 
