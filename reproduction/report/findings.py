@@ -7,7 +7,7 @@ against the true poses. A run that lacks the rows of a finding has one finding l
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from reproduction.claims.verdicts import GROUPS
+from reproduction.design.profiles import read_profile
 from reproduction.report.fresh import is_fresh
 from reproduction.report.intervals import Interval, cell_interval, mean_change
 from reproduction.report.publish import PUBLISHED
@@ -27,7 +28,9 @@ from reproduction.tables.references import SCHEMA as REFERENCES
 from reproduction.tables.references import two_digits
 from synfeal.records.tables import Schema, read_frame, rows_of
 
-ROOM, SMALL, LARGE = "large_room", "6k", "80k"
+ROOM, SMALL, NEXT, LARGE = "large_room", "6k", "20k", "80k"
+# Runs with fresh seeds that findings are told by, where they are published.
+LABELS, CONTROLS = "labels", "controls"
 POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
 # What feature matching does without depth: points are where rays of two training frames meet.
 WITHOUT_DEPTH, ADJUSTED = "structure-rays", "structure-adjusted"
@@ -241,28 +244,22 @@ def half_the_images(root: Path) -> tuple[Interval, Interval, float, float]:
     """
     shown = read_table(root, "table7_images_shown")
     half, whole = (shown[shown.init == init] for init in ("pretrained-half", "pretrained"))
-    size = read_table(root, "table4_size")
-    room = size[size.scene == ROOM]
-    both = [
-        (
-            mean_change(half, whole, measure),
-            mean_change(room[room["size"] == SMALL], room[room["size"] == LARGE], measure),
-        )
-        for measure in (POSITION, ORIENTATION)
-    ]
-    shares = [math.log(images.value) / math.log(frames.value) for images, frames in both]
-    return both[0][0], both[1][0], shares[0], shares[1]
+    size = sizes_of_room(root)
+    images, frames = _changes(half, whole), _changes(size[SMALL], size[LARGE])
+    shares = [math.log(i.value) / math.log(f.value) for i, f in zip(images, frames, strict=True)]
+    return *images, shares[0], shares[1]
 
 
 def more_frames_help(root: Path) -> Finding | None:
     """Compare sizes of the data set, with the part of the effect that is longer training."""
-    size = read_table(root, "table4_size")
-    room = size[size.scene == ROOM]
-    if not {SMALL, LARGE} <= {*room["size"]}:
+    controls = fresh_run(root, CONTROLS)
+    if controls != root:
+        return frames_and_images(root, controls)
+    size = sizes_of_room(root)
+    if not {SMALL, LARGE} <= {*size}:
         return None
-    few, many = room[room["size"] == SMALL], room[room["size"] == LARGE]
-    unpaired = mean_change(few, many, POSITION), mean_change(few, many, ORIENTATION)
-    position, orientation = paired_changes(root, "C7") or unpaired
+    few, many = size[SMALL], size[LARGE]
+    position, orientation = paired_changes(root, "C7") or _changes(few, many)
     if max(position.high, orientation.high) >= 1:
         return None
     images_m, images_deg, *shares = half_the_images(root)
@@ -280,9 +277,63 @@ def more_frames_help(root: Path) -> Finding | None:
     )
 
 
+def frames_and_images(root: Path, controls: Path) -> Finding | None:
+    """Tell what more frames are worth from what more images are, where a run keeps them apart.
+
+    Args:
+        root: Published results whose smallest set was shown fewer images.
+        controls: Published results whose two smallest sets were shown the same number.
+    """
+    size, fewer = sizes_of_room(controls), sizes_of_room(root)
+    shown, before = (images_shown(one.name) for one in (controls, root))
+    if shown[SMALL] != shown[NEXT] or before[SMALL] >= shown[SMALL]:
+        return None
+    few, many = size[SMALL], size[LARGE]
+    whole = paired_changes(controls, "C7") or _changes(few, many)
+    frames = _changes(few, size[NEXT])
+    images = _changes(fewer[SMALL], few)
+    if max(change.high for change in whole) >= 1:
+        return None
+    alone = (
+        "More frames help, also where no more images are shown."
+        if max(change.high for change in frames) < 1
+        else "More frames help, together with longer training."
+    )
+    return Finding(
+        alone,
+        f"Shown {shown[SMALL]:,} images each, localizers that learn from {NEXT} instead of {SMALL}"
+        f" frames of the Large Room have a position error that changes by {_percent(frames[0])} and"
+        f" an orientation error that changes by {_percent(frames[1])}. From {SMALL} frames to"
+        f" {LARGE}, which were shown {shown[LARGE]:,} images, the changes are {_percent(whole[0])}"
+        f" and {_percent(whole[1])} {_printed(few, many)}. At {SMALL}, {shown[SMALL]:,} images"
+        f" instead of the {before[SMALL]:,} of `{root.name}` change the errors by"
+        f" {_percent(images[0])} and {_percent(images[1])}.",
+        "labels and truth alike",
+        "table4_size",
+        controls.name,
+    )
+
+
+def sizes_of_room(root: Path) -> dict[str, pd.DataFrame]:
+    """Return the rows of Table 4 in the Large Room, by size."""
+    cells = read_table(root, "table4_size")
+    room = cells[cells.scene == ROOM]
+    return {str(size): rows for size, rows in room.groupby("size")}
+
+
+def images_shown(profile: str) -> Mapping[str, int]:
+    """Return how many images the runs of a profile are shown, by size."""
+    return read_profile(profile).config.training.samples_seen
+
+
+def _changes(before: pd.DataFrame, after: pd.DataFrame) -> tuple[Interval, Interval]:
+    """Compute the factors of both errors between rows of the same localizers."""
+    return mean_change(before, after, POSITION), mean_change(before, after, ORIENTATION)
+
+
 def no_difference_at_this_dose(root: Path) -> Finding | None:
     """Compare labels of SfM and RGB-D SLAM with exact ones, in the run that tests labels."""
-    asked, root = root, run_of_labels(root)
+    asked, root = root, fresh_run(root, LABELS)
     cells = read_table(root, "table2_ground_truth")
     errors = read_table(root, "label_error", LABEL_ERROR)
     own = errors[
@@ -331,13 +382,14 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
     )
 
 
-def run_of_labels(root: Path) -> Path:
-    """Return the published run that tests labels with fresh seeds, or ``root`` if there is none.
+def fresh_run(root: Path, profile: str) -> Path:
+    """Return the published run of a profile with fresh seeds, or ``root`` if there is none.
 
     Args:
         root: Published results, or those of a finished run, which are told by themselves.
+        profile: Name of the profile.
     """
-    other = root.with_name("labels")
+    other = root.with_name(profile)
     if root.parent.name != PUBLISHED.name or not (other / "claims.csv").is_file():
         return root
     return other if is_fresh(read_published(other)) else root

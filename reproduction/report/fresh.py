@@ -25,6 +25,7 @@ from synfeal.records.tables import MAYBE, TEXT, read_frame
 
 # All runs that were published before the rules were frozen, or that chose a setting, had this seed.
 SEEN_SEED = "0"
+BENCHMARKS = RESULTS / "benchmarks"
 # No chance enters the claims about the set-up, and C9 is not judged (docs/rules.md).
 NOT_DRAWN = ("C9",)
 # Verdicts that leave a claim open.
@@ -78,6 +79,15 @@ class Judged(NamedTuple):
         return self.row["verdict_true"] not in OPEN
 
 
+def is_decided(judged: Sequence[Judged]) -> bool:
+    """Tell whether runs decide a claim: one does, and none decides it otherwise.
+
+    Args:
+        judged: All verdicts with fresh seeds on one claim, also those that leave it open.
+    """
+    return len({own.row["verdict_true"] for own in judged if own.decided}) == 1
+
+
 def claims_to_test() -> list[Claim]:
     """List the claims that seeds can decide: those about localization and about labels."""
     claims = [claim for claim in published_claims() if claim.id not in NOT_DRAWN]
@@ -89,23 +99,29 @@ def is_fresh(rows: Sequence[Mapping[str, str]]) -> bool:
     return rules_of(rows) == frozen_rules().tag and rows[0].get("seed") != SEEN_SEED
 
 
-def judged_fresh(published: Path = PUBLISHED) -> list[Judged]:
-    """List the claims judged with fresh seeds, in their order.
+def judged_fresh(published: Path = PUBLISHED) -> dict[str, list[Judged]]:
+    """Collect all verdicts with fresh seeds, by id of the claim, in the order of the claims.
 
-    Where two runs judge a claim, the one stands that decides it, else the first by name.
+    No verdict is passed over: a claim that several runs judge has all of theirs, first that of the
+    run that is for it (``RUNS``), then the others by name.
 
     Args:
         published: Folder of the published runs.
     """
+    found: dict[str, list[Judged]] = {claim.id: [] for claim in claims_to_test()}
     claims = {claim.id: claim for claim in claims_to_test()}
-    found: dict[str, list[Judged]] = {name: [] for name in claims}
     for root in sorted(path.parent for path in published.glob("*/claims.csv")):
         rows = read_published(root)
         if is_fresh(rows):
             for row in rows:
                 if row["id"] in claims and row["verdict_true"] != Verdict.NOT_TESTABLE:
                     found[row["id"]].append(Judged(claims[row["id"]], root.name, row))
-    return [max(own, key=lambda judged: judged.decided) for own in found.values() if own]
+    meant = {(claim, run.profile) for run in RUNS for claim in run.claims}
+    return {
+        name: sorted(own, key=lambda judged: (name, judged.profile) not in meant)
+        for name, own in found.items()
+        if own
+    }
 
 
 def fresh_claims(published: Path = PUBLISHED) -> str:
@@ -121,7 +137,8 @@ def fresh_claims(published: Path = PUBLISHED) -> str:
             "Verdict": f"**{found.verdict}**",
             "Run": f"`{found.profile}`",
         }
-        for found in judged
+        for own in judged.values()
+        for found in own
     ]
     parts = [fresh_sentence(published), markdown_table(pd.DataFrame(rows)) if rows else ""]
     parts += [_runs(published, judged), _open(judged)]
@@ -133,59 +150,76 @@ def fresh_sentence(published: Path = PUBLISHED) -> str:
     judged, asked = judged_fresh(published), claims_to_test()
     if not judged:
         return "No claim has been judged with fresh seeds yet."
-    verdicts = [f"{found.claim.id} {found.verdict}" for found in judged]
-    decided = sum(found.decided for found in judged)
+    several = any(len(own) > 1 for own in judged.values())
+    verdicts = [f"{name} {_verdicts(own)}" for name, own in judged.items()]
+    decided = sum(map(is_decided, judged.values()))
+    rule = (
+        " A claim that several runs judge has the verdicts of all; it counts as decided if one"
+        " decides it and none decides it otherwise."
+    )
     return (
         f"**With fresh seeds**, by rules that were frozen before, {len(judged)} of the"
         f" {len(asked)} claims about localization and labels have been judged so far, and"
         f" {decided} of them decided: {', '.join(verdicts)}. (Two verdicts are against the labels /"
-        " against the true poses.)"
+        f" against the true poses.){rule if several else ''}"
     )
 
 
-def _runs(published: Path, judged: Sequence[Judged]) -> str:
+def _verdicts(judged: Sequence[Judged]) -> str:
+    """Name the verdicts on one claim, and the runs where there are several."""
+    if len(judged) == 1:
+        return judged[0].verdict
+    return " and ".join(f"{own.verdict} (`{own.profile}`)" for own in judged)
+
+
+def _runs(published: Path, judged: Mapping[str, Sequence[Judged]]) -> str:
     """Name the runs, each with its seed and commit."""
+    seeds = {found.profile: found.row["seed"] for own in judged.values() for found in own}
     texts = []
-    for profile in dict.fromkeys(found.profile for found in judged):
+    for profile, seed in seeds.items():
         record = read_result(published / profile / "provenance.json", ("commit",), "publish again")
-        row = next(found.row for found in judged if found.profile == profile)
-        texts.append(f"`{profile}`: seed {row['seed']}, commit `{record['commit'][:9]}`")
+        texts.append(f"`{profile}`: seed {seed}, commit `{record['commit'][:9]}`")
     return f"Runs: {'; '.join(texts)}." if texts else ""
 
 
-def _open(judged: Sequence[Judged]) -> str:
+def _open(judged: Mapping[str, Sequence[Judged]]) -> str:
     """List the claims that no fresh seed has decided, by the run that would."""
-    decided = {found.claim.id for found in judged if found.decided}
-    items = [
-        f"- {found.claim.id}: more training runs per cell of `{found.profile}`; limits shrink with"
-        " the root of their number."
-        for found in judged
-        if not found.decided
-    ]
+    items = []
     for run in RUNS:
-        left = [claim for claim in run.claims if claim not in decided]
-        if left and not _was_run(run, judged):
+        left = [name for name in run.claims if not is_decided(judged.get(name, ()))]
+        own = [f for name in left for f in judged.get(name, ()) if f.profile == run.profile]
+        if trained := [found.claim.id for found in own if found.row["seeds"]]:
             items.append(
-                f"- {', '.join(left)}: profile `{run.profile}`, planned at"
+                f"- {', '.join(trained)}: more training runs per cell of `{run.profile}`. As many"
+                f" again are planned at {planned_hours(run, 'train'):.1f} hours of processor time;"
+                " the part of the limits that training runs cause shrinks with the root of their"
+                " number."
+            )
+        if counted := [found.claim.id for found in own if not found.row["seeds"]]:
+            items.append(f"- {', '.join(counted)}: more batches than `{run.profile}` has.")
+        if unjudged := [name for name in left if name not in judged]:
+            items.append(
+                f"- {', '.join(unjudged)}: profile `{run.profile}`, planned at"
                 f" {planned_hours(run):.1f} hours of processor time"
                 f" ([plan](../results/benchmarks/plan_{run.profile}.csv))."
             )
     return "\n".join(["What would decide the others:", "", *items]) if items else ""
 
 
-def _was_run(run: JudgingRun, judged: Sequence[Judged]) -> bool:
-    return any(found.profile == run.profile for found in judged)
-
-
-def planned_hours(run: JudgingRun, folder: Path = RESULTS / "benchmarks") -> float:
+def planned_hours(run: JudgingRun, row: str = "total", folder: Path = BENCHMARKS) -> float:
     """Return the hours of processor time that a run is planned at.
+
+    Args:
+        run: The run.
+        row: Row of its plan: a rule, such as ``train``, or ``total``.
+        folder: Folder of the plans.
 
     Raises:
         InputError: It has not been planned.
     """
     path = folder / f"plan_{run.profile}.csv"
     costs = read_frame(path, {"name": TEXT, "cpu_s": MAYBE}, "make plan")
-    own = costs[costs.name == "total"]
+    own = costs[costs.name == row]
     if own.empty:
-        raise InputError(f"{path}: has no row 'total'; make plan")
+        raise InputError(f"{path}: has no row {row!r}; make plan")
     return float(own.cpu_s.iloc[0]) / 3600

@@ -14,7 +14,7 @@ from reproduction.report.findings import (
     FINDINGS,
     can_tell,
     findings,
-    run_of_labels,
+    fresh_run,
     sentences,
 )
 from reproduction.report.intervals import Interval, cell_interval, mean_change
@@ -204,9 +204,9 @@ def test_labels_are_told_by_a_published_run_with_fresh_seeds(tmp_path, folder, s
     other.mkdir(parents=True)
     claims = pd.read_csv(NIGHT.with_name("mini") / "claims.csv", dtype=str)
     claims.assign(seed=seed).to_csv(other / "claims.csv", index=False)
-    assert run_of_labels(other.with_name("night")).name == told_by
+    assert fresh_run(other.with_name("night"), "labels").name == told_by
     (other / "claims.csv").unlink()
-    assert run_of_labels(other.with_name("night")).name == "night"
+    assert fresh_run(other.with_name("night"), "labels").name == "night"
 
 
 def test_sentences_name_the_metres_that_labels_truly_moved_by(tmp_path):

@@ -15,6 +15,7 @@ from reproduction.report.fresh import (
     claims_to_test,
     fresh_claims,
     fresh_sentence,
+    is_decided,
     judged_fresh,
     planned_hours,
 )
@@ -46,30 +47,57 @@ def publish_copy(folder, name, changes=(), **common):
         writer.writerows(rows)
 
 
+def profiles(judged):
+    return {found.profile for own in judged.values() for found in own}
+
+
 def test_seeds_that_were_seen_and_rules_that_were_replaced_do_not_count(tmp_path):
     publish_copy(tmp_path, "seen", seed="0")
     publish_copy(tmp_path, "replaced", seed="7", rules=rules_history()[0].tag)
-    assert judged_fresh(tmp_path) == []
+    assert judged_fresh(tmp_path) == {}
     assert "No claim" in fresh_sentence(tmp_path)
     publish_copy(tmp_path, "fresh", seed="7")
-    assert {found.profile for found in judged_fresh(tmp_path)} == {"fresh"}
+    assert profiles(judged_fresh(tmp_path)) == {"fresh"}
 
 
 def test_claims_without_chance_are_left_out(tmp_path):
     publish_copy(tmp_path, "fresh", seed="7")
-    names = {found.claim.id for found in judged_fresh(tmp_path)}
+    names = {*judged_fresh(tmp_path)}
     assert names
     assert not names & {"C9", "C14", "C16"}
     assert len(claims_to_test()) == 13
 
 
-def test_of_two_runs_the_one_that_decides_a_claim_stands(tmp_path):
-    undecided, holds = str(Verdict.UNDECIDED), str(Verdict.HOLDS)
-    publish_copy(tmp_path, "a", [("C2", "verdict_true", undecided)], seed="1")
-    publish_copy(tmp_path, "b", [("C2", "verdict_true", holds)], seed="2")
-    publish_copy(tmp_path, "c", [("C2", "verdict_true", str(Verdict.NOT_TESTABLE))], seed="3")
-    (found,) = (found for found in judged_fresh(tmp_path) if found.claim.id == "C2")
-    assert (found.profile, found.decided) == ("b", True)
+def test_no_verdict_of_several_runs_is_passed_over(tmp_path):
+    for seed, (profile, verdict) in enumerate(
+        {
+            "a": Verdict.UNDECIDED,
+            "b": Verdict.HOLDS,
+            "c": Verdict.NOT_TESTABLE,
+            "labels": Verdict.UNDECIDED,
+        }.items(),
+        start=1,
+    ):
+        publish_copy(tmp_path, profile, [("C2", "verdict_true", str(verdict))], seed=str(seed))
+    judged = judged_fresh(tmp_path)["C2"]
+    # The run that is for the claim, then the others; what could not judge it is no verdict.
+    assert [own.profile for own in judged] == ["labels", "a", "b"]
+    assert is_decided(judged)
+    text = fresh_claims(tmp_path)
+    assert all(text.count(f"| `{profile}` |") for profile in ("labels", "a", "b"))
+    assert "holds (`b`)" in text
+    assert "undecided (`a`)" in text
+    assert "C2" not in text.split("What would decide the others")[1]
+
+
+def test_runs_that_contradict_each_other_leave_a_claim_open(tmp_path):
+    publish_copy(tmp_path, "a", [("C2", "verdict_true", str(Verdict.OPPOSITE))], seed="1")
+    publish_copy(tmp_path, "labels", [("C2", "verdict_true", str(Verdict.HOLDS))], seed="2")
+    judged = judged_fresh(tmp_path)["C2"]
+    assert all(own.decided for own in judged)
+    assert not is_decided(judged)
+    left = fresh_claims(tmp_path).split("What would decide the others")[1]
+    assert "C2" in left
 
 
 def test_a_page_names_run_seed_verdicts_and_what_is_open(tmp_path, monkeypatch):
@@ -131,12 +159,12 @@ def test_hours_are_those_of_the_tracked_plans(tmp_path):
     with (BENCHMARKS / "plan_controls.csv").open(newline="") as file:
         total = next(row for row in csv.DictReader(file) if row["name"] == "total")
     (controls,) = (run for run in RUNS if run.profile == "controls")
-    assert planned_hours(controls, BENCHMARKS) == pytest.approx(float(total["cpu_s"]) / 3600)
+    assert planned_hours(controls, folder=BENCHMARKS) == pytest.approx(float(total["cpu_s"]) / 3600)
     with pytest.raises(InputError, match="plan_controls"):
-        planned_hours(controls, tmp_path)
+        planned_hours(controls, folder=tmp_path)
     (tmp_path / "plan_controls.csv").write_text("name,cpu_s\nscene,1\n")
     with pytest.raises(InputError, match="make plan"):
-        planned_hours(controls, tmp_path)
+        planned_hours(controls, folder=tmp_path)
 
 
 def test_published_runs_are_read_where_pages_are_made(monkeypatch):
