@@ -50,6 +50,7 @@ RUNS = (
     JudgingRun("controls", ("C7", "C11", "C12")),
     JudgingRun("sanctuary", ("C8",)),
     JudgingRun("transfer", ("C10", "C13")),
+    JudgingRun("curves", ("C13",)),
     JudgingRun("tracking", ("C15",)),
 )
 
