@@ -85,8 +85,15 @@ def _difference(
     verdict: Verdict = "better" if high < 0 else "worse" if low > 0 else "no difference seen"
     (sd_a, n_a), (sd_b, n_b) = _deviation(medians_a), _deviation(medians_b)
     return {
-        **{"a": a, "b": b, "difference": value, "low": float(low), "high": float(high)},
-        **{"change_percent": _percent(value, a), "verdict": verdict, "sd_a": sd_a, "sd_b": sd_b},
+        "a": a,
+        "b": b,
+        "difference": value,
+        "low": float(low),
+        "high": float(high),
+        "change_percent": _percent(value, a),
+        "verdict": verdict,
+        "sd_a": sd_a,
+        "sd_b": sd_b,
         "se_seeds": math.hypot(sd_a / math.sqrt(n_a), sd_b / math.sqrt(n_b)),
     }
 

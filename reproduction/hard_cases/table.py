@@ -15,8 +15,11 @@ from synfeal.records.tables import COUNT, LIMITLESS, NUMBER, TEXT, frame_of, wri
 NAME = "hard_cases"
 SCHEMA = {
     **dict.fromkeys(("family", "case", "quantity", "unit", "naive", "ours"), TEXT),
-    **{"naive_error": LIMITLESS, "our_error": LIMITLESS, "bound": NUMBER},
-    **{"ok": COUNT, "reference": TEXT},
+    "naive_error": LIMITLESS,
+    "our_error": LIMITLESS,
+    "bound": NUMBER,
+    "ok": COUNT,
+    "reference": TEXT,
 }
 
 

@@ -37,10 +37,18 @@ DEPTH_OFF_MM = 10.0
 # in levels of 0 to 255 and as peak signal-to-noise ratio; those of depth from the full mesh's at
 # the same pixel centres, where both hit, and the share of these pixels off by more than 10 mm.
 SCHEMA = {
-    **{"backend": TEXT, "width": COUNT, "height": COUNT, "supersampling": COUNT},
-    **{"texture_scale": NUMBER, "faces": COUNT, "ms_per_frame": NUMBER},
-    **{"mean_abs_error": NUMBER, "psnr_db": NUMBER},
-    **{"depth_error_mm": NUMBER, "depth_off_share": NUMBER, "chosen": COUNT},
+    "backend": TEXT,
+    "width": COUNT,
+    "height": COUNT,
+    "supersampling": COUNT,
+    "texture_scale": NUMBER,
+    "faces": COUNT,
+    "ms_per_frame": NUMBER,
+    "mean_abs_error": NUMBER,
+    "psnr_db": NUMBER,
+    "depth_error_mm": NUMBER,
+    "depth_off_share": NUMBER,
+    "chosen": COUNT,
 }
 
 log = logging.getLogger("synfeal")
@@ -222,7 +230,8 @@ def measure_camera(
     return [
         {
             "backend": variant.render.backend,
-            **{"width": camera.width, "height": camera.height},
+            "width": camera.width,
+            "height": camera.height,
             "supersampling": variant.render.supersampling,
             "texture_scale": variant.texture_scale,
             "faces": variant.mesh.n_faces,

@@ -32,8 +32,12 @@ FACTS = {
     "volume_m3": ("Volume [m³]", "{:,.2f}"),
 }
 SCHEMA = {
-    **{"scene": TEXT, "vertices": COUNT, "faces": COUNT, "volume_m3": NUMBER},
-    **{"published_vertices": MAYBE_COUNT, "published_faces": MAYBE_COUNT},
+    "scene": TEXT,
+    "vertices": COUNT,
+    "faces": COUNT,
+    "volume_m3": NUMBER,
+    "published_vertices": MAYBE_COUNT,
+    "published_faces": MAYBE_COUNT,
     "published_volume_m3": MAYBE,
 }
 CAPTION = "Properties of the 3D textured meshes used."

@@ -59,8 +59,11 @@ SCHEMA = {
     **dict.fromkeys(KEYS, TEXT) | dict.fromkeys(("noise_m", "noise_deg"), NUMBER),
     **dict.fromkeys((*MEASURES, *LIMITS, *WITHIN), MAYBE),
     **dict.fromkeys(("n_train", "n_test", "n_seeds"), COUNT),
-    **{"failed": MAYBE_COUNT, MOVED: EXTRA},
-    **{"seconds_per_frame": MAYBE, "preparation_seconds": EXTRA},  # last, as they are measured
+    "failed": MAYBE_COUNT,
+    MOVED: EXTRA,
+    # Last, as they are measured.
+    "seconds_per_frame": MAYBE,
+    "preparation_seconds": EXTRA,
 }
 TIME, PREPARATION = "Time per frame, one core", "Time to learn or to build the map"
 LINES = ["data_set", "labels", "against"]

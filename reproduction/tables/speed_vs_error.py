@@ -36,7 +36,11 @@ from synfeal.records.tables import (
 TABLE = "table4_size"
 KIND = "synfeal/pretrained"
 CELL = {
-    **{"scene": TEXT, "size": TEXT, "model": TEXT, "n_train": COUNT, "n_seeds": COUNT},
+    "scene": TEXT,
+    "size": TEXT,
+    "model": TEXT,
+    "n_train": COUNT,
+    "n_seeds": COUNT,
     "position_m_true": MAYBE,
 }
 
@@ -86,12 +90,21 @@ def _seconds_per_image(root: Path, run: str, n_seeds: int) -> float:
 
 NAME = "speed_vs_error"
 SCHEMA = {
-    **{"stage": TEXT, "scene": TEXT, "variant": TEXT, "faces": MAYBE_COUNT},
+    "stage": TEXT,
+    "scene": TEXT,
+    "variant": TEXT,
+    "faces": MAYBE_COUNT,
     **dict.fromkeys(("seconds_per_item", "items_per_s", "error"), NUMBER),
-    **{"error_unit": TEXT, "chosen": COUNT},
-    **{"backend": TEXT, "width": MAYBE_COUNT, "height": MAYBE_COUNT},
-    **{"supersampling": MAYBE_COUNT, "texture_scale": MAYBE, "psnr_db": MAYBE},
-    **{"depth_error_mm": MAYBE, "depth_off_share": MAYBE},
+    "error_unit": TEXT,
+    "chosen": COUNT,
+    "backend": TEXT,
+    "width": MAYBE_COUNT,
+    "height": MAYBE_COUNT,
+    "supersampling": MAYBE_COUNT,
+    "texture_scale": MAYBE,
+    "psnr_db": MAYBE,
+    "depth_error_mm": MAYBE,
+    "depth_off_share": MAYBE,
 }
 
 

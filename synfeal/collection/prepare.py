@@ -60,7 +60,9 @@ def prepare_scene(
     out_dir = out_mesh.parent
     mesh, n_faces = prepare_mesh(name, scene, collision_agreement, seed, out_dir, shade)
     properties = {
-        **{"scene": name, "source": scene.source, "collision_faces": n_faces},
+        "scene": name,
+        "source": scene.source,
+        "collision_faces": n_faces,
         "origin": scene.builder if scene.source == "procedural" else str(scene.path),
         **mesh_properties(mesh),
         "findings": list(mesh.findings),

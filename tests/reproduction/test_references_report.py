@@ -191,7 +191,9 @@ def test_errors_are_those_of_known_answers(tmp_path):
     write_frame(tmp_path / "r.csv", table)
     again = read_frame(tmp_path / "r.csv", SCHEMA)
     assert again.n_test.groupby(again.method).first().to_dict() == {
-        **{"nearest-thumbnail": 2, "nearest-vlad": 2, "posenet": 2},
+        "nearest-thumbnail": 2,
+        "nearest-vlad": 2,
+        "posenet": 2,
         "structure-depth": 1,
     }
     sheet = side_sheet(robustness.side_table(again))

@@ -21,10 +21,16 @@ from tests.support.report_results import (
 RED = (220, 20, 20)
 PLANS = {"train": [[1.0, 1.0, 1.0], [3.0, 1.0, 1.0]], "test": [[1.0, 2.0, 1.0], [3.0, 2.0, 1.5]]}
 CLAIM = dict.fromkeys(COLUMNS, "") | {
-    **{"id": "C2", "section": "4.1", "statement": "A <b>& c", "published": "p -55 %"},
-    **{"measured_labels": "p -41.5 %", "measured_true": "p -33.5 %"},
-    **{"interval_labels": "p -50.0 % to -9.0 %", "interval_true": "p -44.0 % to +3.0 %"},
-    **{"verdict_labels": "holds", "verdict_true": "undecided"},
+    "id": "C2",
+    "section": "4.1",
+    "statement": "A <b>& c",
+    "published": "p -55 %",
+    "measured_labels": "p -41.5 %",
+    "measured_true": "p -33.5 %",
+    "interval_labels": "p -50.0 % to -9.0 %",
+    "interval_true": "p -44.0 % to +3.0 %",
+    "verdict_labels": "holds",
+    "verdict_true": "undecided",
     "reason": "labels: reaches it; true: stays short",
 }
 UNTESTED = CLAIM | dict.fromkeys(("verdict_labels", "verdict_true"), "not testable here")

@@ -106,8 +106,13 @@ def batch_record(index, assisted=False, **values):
     """A batch of 25 frames more; its last pose was 30 cm and 4 degrees off when assisted."""
     off = {"m": 0.3, "deg": 4.0} if assisted else {"m": 0.1, "deg": 1.0}
     return {
-        **{"index": index, "start": 25 * index, "stop": 25 * index + 26, "assisted": assisted},
-        **{"registered": 26, "filled": 0, "lost": False},
+        "index": index,
+        "start": 25 * index,
+        "stop": 25 * index + 26,
+        "assisted": assisted,
+        "registered": 26,
+        "filled": 0,
+        "lost": False,
         **{f"error_before_{unit}": value for unit, value in off.items()},
         **{f"error_after_{unit}": 0.0 if assisted else value for unit, value in off.items()},
         **values,

@@ -141,8 +141,12 @@ def read_mstransformer(out):
 
 
 READERS = {
-    **{"ace": read_ace, "colmap": read_colmap, "hloc": read_hloc, "nerfstudio": read_nerfstudio},
-    **{"mstransformer": read_mstransformer, "tum": read_tum},
+    "ace": read_ace,
+    "colmap": read_colmap,
+    "hloc": read_hloc,
+    "nerfstudio": read_nerfstudio,
+    "mstransformer": read_mstransformer,
+    "tum": read_tum,
 }
 
 
