@@ -9,6 +9,6 @@ WORKDIR /synfeal
 COPY setup/container.sh setup/system_packages.sh setup/
 RUN setup/container.sh
 COPY . .
-RUN make LOCK=$LOCK .venv/installed && rm -rf /root/.cache
+RUN make LOCK=$LOCK .venv/installed compile && rm -rf /root/.cache
 ENV PATH=/synfeal/.venv/bin:$PATH PYTHONHASHSEED=0
 CMD ["make", "help"]

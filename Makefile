@@ -16,8 +16,11 @@ SFM_LABELS ?=
 # A file of tests to a worker: their fixtures are made once, and a worker has one thread.
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(CORES) --dist loadfile
 export PYTHONHASHSEED := 0
+# Modules are compiled when they are first imported. Where this variable is set, as in some images,
+# nothing of that is kept, and every job compiles a thousand modules again: half of its start.
+export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help reproduce smoke real start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock clean
+.PHONY: help reproduce smoke real start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock compile clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -108,13 +111,17 @@ lock: $(INSTALLED)  ## write the versions installed now to the lock files
 	setup/lock_cuda.sh $(BIN)/python > requirements-cuda.lock.new
 	mv requirements-cuda.lock.new requirements-cuda.lock
 
+compile: $(INSTALLED)  ## compile all installed modules, for images that keep nothing compiled later
+	@# Some packages have modules that this Python cannot read and nobody imports.
+	-$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib synfeal baselines reproduction workflow
+
 clean:  ## remove results of the smoke profile and caches
 	rm -rf results/smoke .pytest_cache .mypy_cache .ruff_cache
 
 $(INSTALLED): $(LOCK) pyproject.toml baselines/pyproject.toml reproduction/pyproject.toml setup/system_packages.sh
 	setup/system_packages.sh $(PYTHON)
 	$(PYTHON) -m venv $(VENV)
-	@# Modules are compiled when they are first imported, which most of these never are.
+	@# Compiling all modules takes longer than compiling those that are ever imported, when they are.
 	$(BIN)/python -m pip install --quiet --no-compile --requirement $(LOCK)
 	setup/meshoptimizer.sh $(BIN)/python
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable . --editable ./baselines --editable ./reproduction

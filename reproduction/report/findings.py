@@ -28,7 +28,7 @@ from reproduction.tables.references import SCHEMA as REFERENCES
 from reproduction.tables.references import two_digits
 from synfeal.records.tables import Schema, read_frame, rows_of
 
-ROOM, SMALL, NEXT, LARGE = "large_room", "6k", "20k", "80k"
+ROOM, SMALL, LARGE = "large_room", "6k", "80k"
 # Runs with fresh seeds that findings are told by, where they are published.
 LABELS, CONTROLS = "labels", "controls"
 POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
@@ -278,35 +278,36 @@ def more_frames_help(root: Path) -> Finding | None:
 
 
 def frames_and_images(root: Path, controls: Path) -> Finding | None:
-    """Tell what more frames are worth from what more images are, where a run keeps them apart.
+    """Tell what more frames are worth from what more images are, by two runs.
 
     Args:
-        root: Published results whose smallest set was shown fewer images.
-        controls: Published results whose two smallest sets were shown the same number.
+        root: Published results whose largest set was shown as many images as the smallest set of
+            ``controls``.
+        controls: Published results of a run that shows more images at every size.
     """
-    size, fewer = sizes_of_room(controls), sizes_of_room(root)
-    shown, before = (images_shown(one.name) for one in (controls, root))
-    if shown[SMALL] != shown[NEXT] or before[SMALL] >= shown[SMALL]:
+    size, size_before = sizes_of_room(controls), sizes_of_room(root)
+    shown, shown_before = (images_shown(one.name) for one in (controls, root))
+    if shown[SMALL] != shown_before[LARGE]:
         return None
     few, many = size[SMALL], size[LARGE]
     whole = paired_changes(controls, "C7") or _changes(few, many)
-    frames = _changes(few, size[NEXT])
-    images = _changes(fewer[SMALL], few)
+    frames = _changes(few, size_before[LARGE])
+    images = _changes(size_before[SMALL], few)
     if max(change.high for change in whole) >= 1:
         return None
-    alone = (
+    headline = (
         "More frames help, also where no more images are shown."
         if max(change.high for change in frames) < 1
         else "More frames help, together with longer training."
     )
     return Finding(
-        alone,
-        f"Shown {shown[SMALL]:,} images each, localizers that learn from {NEXT} instead of {SMALL}"
-        f" frames of the Large Room have a position error that changes by {_percent(frames[0])} and"
-        f" an orientation error that changes by {_percent(frames[1])}. From {SMALL} frames to"
-        f" {LARGE}, which were shown {shown[LARGE]:,} images, the changes are {_percent(whole[0])}"
-        f" and {_percent(whole[1])} {_printed(few, many)}. At {SMALL}, {shown[SMALL]:,} images"
-        f" instead of the {before[SMALL]:,} of `{root.name}` change the errors by"
+        headline,
+        f"From {SMALL} to {LARGE} frames of the Large Room, shown {shown[SMALL]:,} and"
+        f" {shown[LARGE]:,} images, the position error changes by {_percent(whole[0])} and the"
+        f" orientation error by {_percent(whole[1])} {_printed(few, many)}. Frames alone, shown"
+        f" {shown[SMALL]:,} images at either size (at {LARGE} in `{root.name}`), change them by"
+        f" {_percent(frames[0])} and {_percent(frames[1])}. Images alone, {shown[SMALL]:,} instead"
+        f" of the {shown_before[SMALL]:,} of `{root.name}` at {SMALL}, change them by"
         f" {_percent(images[0])} and {_percent(images[1])}.",
         "labels and truth alike",
         "table4_size",

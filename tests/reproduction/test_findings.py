@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 from reproduction.report import findings_figure, published_claims
 from reproduction.report.findings import (
@@ -15,12 +16,14 @@ from reproduction.report.findings import (
     can_tell,
     findings,
     fresh_run,
+    more_frames_help,
     sentences,
 )
 from reproduction.report.intervals import Interval, cell_interval, mean_change
 from reproduction.report.published_claims import interval_in, rows_now, rules_note
 from reproduction.statistics.seeds import half_width
 from synfeal.records.tables import read_records
+from tests import CONFIG
 
 NIGHT = Path(__file__).parents[2] / "results/published/night"
 POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
@@ -138,16 +141,27 @@ def test_shapes_of_label_errors(told):
         assert expected[2] < low < value < high
 
 
-def test_size_and_images(told):
-    evidence = numbers(told["more_frames_help"].evidence)
-    claims = {row["id"]: row for _, row in read_records(NIGHT / "claims.csv")}
-    c7 = claims["C7"]
-    position, orientation = numbers(c7["measured_true"])[:2]
-    limits = numbers(c7["interval_true"])
-    expected = [position, *limits[:2], orientation, *limits[2:]]
-    assert evidence[:6] == [round(number) for number in expected]
-    size = table("table4_size").query("scene == 'large_room'")
-    small, large = size[size["size"] == "6k"], size[size["size"] == "80k"]
+def judged(root, claim):
+    """Changes of both errors in percent, each with its limits, as a claim was judged by them."""
+    row = {row["id"]: row for _, row in read_records(root / "claims.csv")}[claim]
+    (position, orientation), ends = (
+        numbers(row["measured_true"])[:2],
+        numbers(row["interval_true"]),
+    )
+    return [position, *ends[:2], orientation, *ends[2:]]
+
+
+def rows_of_size(root, size):
+    cells = table("table4_size", root).query("scene == 'large_room'")
+    return cells[cells["size"] == size]
+
+
+def test_size_and_images_of_one_run(tmp_path):
+    root = Path(shutil.copytree(NIGHT, tmp_path / "published/night"))
+    finding = more_frames_help(root)
+    assert finding.run == ""
+    evidence = numbers(finding.evidence)
+    small, large = rows_of_size(root, "6k"), rows_of_size(root, "80k")
     shown = table("table7_images_shown")
     half, whole = shown[shown.init == "pretrained-half"], shown[shown.init == "pretrained"]
     images = [change(half, whole, measure) for measure in (POSITION, ORIENTATION)]
@@ -156,8 +170,37 @@ def test_size_and_images(told):
     shares = [
         100 * math.log1p(i / 100) / math.log1p(f / 100) for i, f in zip(images, frames, strict=True)
     ]
-    assert evidence[6:] == [round(n) for n in (*printed, *images, *sorted(shares))]
+    expected = [*judged(root, "C7"), *printed, *images, *sorted(shares)]
+    assert evidence == [round(number) for number in expected]
     assert large.n_train.iloc[0] == 80_000
+
+
+def test_frames_and_images_of_the_run_that_keeps_them_apart(told):
+    finding = told["more_frames_help"]
+    controls = NIGHT.with_name("controls")
+    assert finding.run == controls.name
+    shown, before = (
+        yaml.safe_load((CONFIG / f"{name}.yaml").read_text())["training"]["samples_seen"]
+        for name in ("controls", "night")
+    )
+    few, many = (rows_of_size(controls, size) for size in ("6k", "80k"))
+    few_before, many_before = (rows_of_size(NIGHT, size) for size in ("6k", "80k"))
+    found = numbers(finding.evidence)
+    assert found[:2] == [shown["6k"], shown["80k"]]
+    assert found[2:8] == pytest.approx(judged(controls, "C7"), abs=0.501)
+    assert found[8:10] == [
+        round(change(few, many, f"published_{m}")) for m in ("position_m", "orientation_deg")
+    ]
+    # Frames alone: as many images at 80k in night as at 6k here. Images alone: 6k in both runs.
+    assert found[10] == shown["6k"] == before["80k"]
+    assert found[17:19] == [shown["6k"], before["6k"]]
+    for place, old, new in ((11, few, many_before), (19, few_before, few)):
+        for measure, at in ((POSITION, place), (ORIENTATION, place + 3)):
+            value, low, high = found[at : at + 3]
+            assert value == round(change(old, new, measure))
+            assert low < value < high
+    surely_fewer_errors = found[13] < 0 and found[16] < 0
+    assert ("no more images" in finding.headline) == surely_fewer_errors
 
 
 def test_labels_of_estimators(told):
