@@ -17,7 +17,7 @@ SFM_LABELS ?=
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(CORES) --dist loadfile
 export PYTHONHASHSEED := 0
 # Modules are compiled when they are first imported. Where this variable is set, as in some images,
-# nothing of that is kept, and every job compiles a thousand modules again: half of its start.
+# nothing of that is kept, and every job compiles a thousand modules again, half of its start.
 export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help reproduce smoke real start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock compile clean
