@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 from baselines.config.learning import MODELS
 from baselines.labels.batches import Batch, batches_of
@@ -21,8 +22,7 @@ from synfeal.config.dataset import RenderConfig
 from synfeal.config.effects import CLEAN, MIXED, EffectsConfig
 from synfeal.dataset.frame_files import SUFFIX
 from synfeal.dataset.sevenscenes import Sequence, sequences_of
-from synfeal.effects.light import GROUPS as LIGHT_GROUPS
-from synfeal.effects.scene import carton_files
+from synfeal.effects.files import carton_files, light_share_files
 
 SPLITS = ("train", "test")
 REFERENCE_FILES = ("predictions.csv", "errors.csv", "metrics.json", "facts.json")
@@ -176,13 +176,17 @@ class Files:
     def light_shares(self, scene: str, effects: EffectsConfig | None) -> list[str]:
         """List shares of a scene's light, where effects switch its lamps."""
         switched = effects and effects.light and effects.light.states
-        groups = LIGHT_GROUPS if switched else ()
-        return [f"{self.root}/scenes/{scene}/light_{group}.glb" for group in groups]
+        if not switched:
+            return []
+        return [path.as_posix() for path in light_share_files(self.mesh(scene)).values()]
 
     def cartons(self, scene: str) -> list[str]:
         """List the built-in objects of a scene."""
-        mesh = self.config.root / "scenes" / scene / "mesh.glb"
-        return [path.as_posix() for path in carton_files(mesh)]
+        return [path.as_posix() for path in carton_files(self.mesh(scene))]
+
+    def mesh(self, scene: str) -> Path:
+        """Return the mesh of a scene."""
+        return self.config.root / "scenes" / scene / "mesh.glb"
 
     def beside_mesh(self, scene: str, effects: EffectsConfig | None) -> list[str]:
         """List files that effects need of a scene: shares of its light, and objects."""

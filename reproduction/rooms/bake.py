@@ -22,7 +22,7 @@ from reproduction.rooms.scan import (
     seen_faces,
     surface_of,
 )
-from synfeal.effects.light import GROUPS
+from synfeal.effects.files import LIGHT_GROUPS
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.objects.patches import Item, Patch, Points, bilinear
 
@@ -76,12 +76,12 @@ def light_shares(
     albedo, glow = _reflecting(surface, item.patches)
     nearest = np.array([_nearest_group(patch, lighting) for patch in item.patches])
     group_of = np.repeat(nearest, [grid.n_points for grid in surface.grids])
-    own_glow = {group: glow * (group_of == group) for group in GROUPS}
-    light = [received(surface, albedo, own_glow[g], lighting.of_group(g)) for g in GROUPS]
+    own_glow = {group: glow * (group_of == group) for group in LIGHT_GROUPS}
+    light = [received(surface, albedo, own_glow[g], lighting.of_group(g)) for g in LIGHT_GROUPS]
     exposure = exposure_of(np.asarray(sum(light)))
     shown = [
         each * (exposure * (1 - glow))[:, None] + own_glow[group][:, None]
-        for group, each in zip(GROUPS, light, strict=True)
+        for group, each in zip(LIGHT_GROUPS, light, strict=True)
     ]
     *others, _ = np.round(255 * np.stack(shown) / np.maximum(sum(shown), 1e-9)).astype(np.uint8)
     points, _ = _moved(rng, surface, scanned(rng, surface, scanner))
@@ -90,14 +90,14 @@ def light_shares(
     shares = [*others, np.clip(255 - np.sum(others, axis=0, dtype=int), 0, 255).astype(np.uint8)]
     return {
         group: TexturedMesh((MeshPart(group, points, faces, vertex_rgb=share).over(faces),))
-        for group, share in zip(GROUPS, shares, strict=True)
+        for group, share in zip(LIGHT_GROUPS, shares, strict=True)
     }
 
 
 def _nearest_group(patch: Patch, lighting: Lighting) -> str:
     middle = patch.points_m.reshape(-1, 3).mean(axis=0)
     lamps = [(np.linalg.norm(middle - lamp.position_m), lamp.group) for lamp in lighting.lamps]
-    return min(lamps)[1] if lamps else GROUPS[0]
+    return min(lamps)[1] if lamps else LIGHT_GROUPS[0]
 
 
 def _moved(

@@ -70,7 +70,7 @@ class Lighting:
         return np.asarray(value, np.float32)
 
     def of_group(self, group: str) -> Lighting:
-        """Keep one of :data:`synfeal.effects.light.GROUPS`; all of them add up to the whole."""
+        """Keep one group of ``LIGHT_GROUPS``; all of them add up to the whole."""
         return replace(
             self,
             ambient=self.ambient if group == "ambient" else np.zeros_like(self.ambient),

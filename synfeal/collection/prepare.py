@@ -14,7 +14,7 @@ from synfeal.collection.collision import Rung, collision_mesh, write_curve
 from synfeal.config.collection import ClutterConfig, SceneConfig
 from synfeal.config.dataset import Shade
 from synfeal.config.load import check_mesh_file
-from synfeal.effects.scene import CARTONS, carton_files
+from synfeal.effects.files import CARTONS, carton_files
 from synfeal.errors import InputError
 from synfeal.mesh.ambient import with_ambient_light
 from synfeal.mesh.checks import refuse_colourless

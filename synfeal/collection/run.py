@@ -23,7 +23,7 @@ from synfeal.collection.prepare import prepare_mesh, save_cartons
 from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig, DatasetConfig, Shade
 from synfeal.config.effects import MOST_PATH_OBJECTS
-from synfeal.dataset.finish import MANIFEST, finish_dataset, origin_of
+from synfeal.dataset.finish import MANIFEST, finish_dataset
 from synfeal.dataset.frame_files import SUFFIX
 from synfeal.dataset.layer_files import refuse_many_instances
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
@@ -245,7 +245,7 @@ def collect(job: CollectJob, workers: int = 1) -> None:
             job.config.network_camera,
             job.counts,
             job.config.shard_frames,
-            origin_of(job.config, job.scene),
+            job.config.origin_of(job.scene),
             part / MANIFEST,
             packed_px=job.packed_px,
             detail=detail and detail.with_suffix(".json"),

@@ -265,6 +265,20 @@ class DatasetConfig(Strict):
         """Directory of this profile's results."""
         return self.results / self.profile
 
+    def origin_of(self, scene: str) -> dict[str, Any]:
+        """Return the settings that a data set of a scene comes from, less file names.
+
+        Args:
+            scene: Name of the scene.
+        """
+        kept = self.scenes[scene].model_dump(mode="json", exclude={"sizes", "path", "sha256"})
+        return {
+            "scene": {"name": scene, **kept},
+            "collection": self.collection.model_dump(mode="json", exclude={"repeat"}),
+            "render": self.render.model_dump(mode="json"),
+            "seed": self.seed,
+        }
+
     def n_frames(self, scene: str, size: str, split: str) -> int:
         """Count the frames of a split at this profile's scale.
 

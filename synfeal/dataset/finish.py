@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from synfeal.config.dataset import CameraConfig, DatasetConfig, RenderConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.frame_files import frame_file, sequence_at, sequence_names
 from synfeal.dataset.layer_files import ENCODING, MASKS, write_instances
@@ -61,7 +61,7 @@ def finish_dataset(
         camera: Camera of the frames.
         counts: Number of frames of each split.
         shard_frames: Number of frames of a sequence.
-        origin: Record of where the frames come from, see :func:`origin_of`.
+        origin: Record of where the frames come from (``DatasetConfig.origin_of``).
         out_manifest: Manifest to write, beside the sequences.
         coverage: What each plan covers, if that is to be written.
         packed_px: Side of packed frames, pixels, if they are written too.
@@ -130,17 +130,6 @@ def _write_effects(directory: Path, origin: Mapping[str, Any], mesh: Path) -> di
                 name = plan.with_suffix(suffix).name
                 hashes[name] = file_sha256(plan.with_suffix(suffix))
     return {"effects_sha256": hashes}
-
-
-def origin_of(config: DatasetConfig, scene: str) -> dict[str, Any]:
-    """Return the settings a data set came from, less file names, for its manifest."""
-    kept = config.scenes[scene].model_dump(mode="json", exclude={"sizes", "path", "sha256"})
-    return {
-        "scene": {"name": scene, **kept},
-        "collection": config.collection.model_dump(mode="json", exclude={"repeat"}),
-        "render": config.render.model_dump(mode="json"),
-        "seed": config.seed,
-    }
 
 
 def write_manifest(

@@ -15,6 +15,7 @@ from PIL import Image
 from trimesh.visual.color import linear_to_srgb, srgb_to_linear
 
 from synfeal.config.effects import ExposureConfig, LightConfig, NoiseConfig
+from synfeal.effects.files import LIGHT_GROUPS
 
 Light = NDArray[np.float32]
 Rgb = NDArray[np.uint8]
@@ -31,8 +32,7 @@ _RGB_FROM_XYZ = np.array(
 DARKEST = 1e-4  # mean light that auto-exposure takes black frames for
 
 WAVES = 6
-GROUPS = ("ambient", "lamps", "daylight")
-# Weights of the groups; `lamps` and `daylight` add up to the scene's own light.
+# Weights of `LIGHT_GROUPS`; `lamps` and `daylight` add up to the scene's own light.
 STATES: dict[str, tuple[float, float, float]] = {
     "all": (1.0, 1.0, 1.0),
     "lamps": (0.5, 1.0, 0.0),
@@ -92,7 +92,7 @@ class LightState:
     @property
     def weights(self) -> dict[str, float] | None:
         """Weight of each group of sources; None where they are not switched."""
-        return dict(zip(GROUPS, STATES[self.state], strict=True)) if self.state else None
+        return dict(zip(LIGHT_GROUPS, STATES[self.state], strict=True)) if self.state else None
 
     @property
     def gains(self) -> Light:

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
-from synfeal.effects.light import GROUPS, Light
+from synfeal.effects.files import LIGHT_GROUPS, carton_files, light_share_files
+from synfeal.effects.light import Light
 from synfeal.errors import InputError
 from synfeal.mesh.instances import number_instances
 from synfeal.mesh.load import load_mesh
@@ -31,12 +32,6 @@ from synfeal.render.surface import Surface, SurfaceTable
 Array = NDArray[np.float64]
 REACH_M = 3.0  # from a path, sideways
 TRIES = 200  # places, before an object is left out
-CARTONS = 8  # beside the mesh of a scene, where no files are named
-
-
-def carton_files(mesh: Path) -> tuple[Path, ...]:
-    """Return the files of the built-in objects of a scene."""
-    return tuple(mesh.with_name(f"carton_{number}.glb") for number in range(CARTONS))
 
 
 @dataclass(frozen=True)
@@ -122,7 +117,7 @@ class SceneRenderer(Renderer):
         self._camera, self._render, self._crowd = camera, render, crowd
         self._mesh, self._full, self._placed = mesh, full, placed
         self._ideal = open_renderer(mesh, camera, render)
-        even = render.model_copy(update={"background_rgb": (255 // len(GROUPS),) * 3})
+        even = render.model_copy(update={"background_rgb": (255 // len(LIGHT_GROUPS),) * 3})
         held = (shares or {}).items()
         self._shares = {group: open_renderer(share, camera, even) for group, share in held}
 
@@ -206,8 +201,7 @@ def open_scene(
     """
     render = render or RenderConfig()
     light = render.effects and render.effects.light
-    groups = GROUPS if light and light.states else ()
-    files = {group: mesh.with_name(f"light_{group}.glb") for group in groups}
+    files = light_share_files(mesh) if light and light.states else {}
     missing = [file for file in files.values() if not file.is_file()]
     if missing:
         raise InputError(

@@ -331,7 +331,7 @@ rule dataset:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         counts=lambda w: {s: FILES.n_frames(w.scene, w.camera, s) for s in SPLITS},
         shard_frames=CONFIG.shard_frames,
-        origin=lambda w: origin_of(CONFIG, w.scene),
+        origin=lambda w: CONFIG.origin_of(w.scene),
     script:
         "../scripts/run_dataset.py"
 

@@ -24,9 +24,8 @@ from reproduction.design.labels import check_sources, estimation_parameters
 from reproduction.design.runs import training_parameters
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.config.load import read_yaml
-from synfeal.dataset.finish import origin_of
 from synfeal.dataset.frame_files import SUFFIX
-from synfeal.effects.light import GROUPS as LIGHT_GROUPS
+from synfeal.effects.files import LIGHT_GROUPS
 from synfeal.errors import InputError
 from synfeal.records.lock import begin_run
 from synfeal.records.provenance import config_hash, seed_of
