@@ -8,6 +8,7 @@ claim the run that would decide it, with the processor time that is planned for 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -28,6 +29,8 @@ SEEN_SEED = "0"
 BENCHMARKS = RESULTS / "benchmarks"
 # No chance enters the claims about the set-up, and C9 is not judged (docs/rules.md).
 NOT_DRAWN = ("C9",)
+# What `measured_true` has beside the changes that are judged.
+BESIDE = re.compile("; (?:sign tests|tau)")
 # Verdicts that leave a claim open.
 OPEN = (Verdict.UNDECIDED, Verdict.NOT_TESTABLE, Verdict.NOT_LEARNT)
 
@@ -133,7 +136,7 @@ def fresh_claims(published: Path = PUBLISHED) -> str:
             "": found.claim.id,
             "Claim": found.claim.statement,
             "Published": found.claim.published,
-            "Against the true poses": found.row["measured_true"].split("; sign tests")[0],
+            "Against the true poses": BESIDE.split(found.row["measured_true"])[0],
             "95 % limits": found.row["interval_true"] or "–",
             "Verdict": f"**{found.verdict}**",
             "Run": f"`{found.profile}`",

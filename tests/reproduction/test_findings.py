@@ -254,7 +254,7 @@ def test_labels_are_told_by_a_published_run_with_fresh_seeds(tmp_path, folder, s
 
 def test_sentences_name_the_metres_that_labels_truly_moved_by(tmp_path):
     root = tmp_path / "published/night"
-    for path in (NIGHT, NIGHT.with_name("labels")):
+    for path in (NIGHT, NIGHT.with_name("labels"), NIGHT.with_name("controls")):
         shutil.copytree(path, root.with_name(path.name))
     path = root / "tables/table3_inconsistencies.csv"
     cells = pd.read_csv(path)
