@@ -14,12 +14,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from reproduction.claims.rules import frozen_rules
 from reproduction.claims.verdicts import GROUPS
 from reproduction.design.profiles import read_profile
 from reproduction.report.fresh import is_fresh
 from reproduction.report.intervals import Interval, cell_interval, mean_change
 from reproduction.report.publish import PUBLISHED
-from reproduction.report.published_claims import counts_now, interval_in, read_published
+from reproduction.report.published_claims import (
+    counts_now,
+    interval_in,
+    read_published,
+    rules_of,
+)
 from reproduction.statistics.limits import sign_test
 from reproduction.tables.cells import schema_of
 from reproduction.tables.label_error import SCHEMA as LABEL_ERROR
@@ -455,13 +461,16 @@ def sentences(root: Path, link: str = "") -> list[str]:
 
 def verdict_sentence(root: Path) -> str:
     """Say how the paper's claims fared against the truth, group by group."""
-    groups = counts_now(read_published(root), root)
+    rows = read_published(root)
+    groups = counts_now(rows, root)
     parts = []
     for group, title in GROUPS.items():
         verdicts = ", ".join(f"{n} {verdict}" for verdict, n in groups[group].most_common())
         parts.append(f"*{title}* {verdicts}")
     total = sum(sum(counts.values()) for counts in groups.values())
-    return f"Of the paper's {total} claims, judged by the true poses: {'; '.join(parts)}."
+    was_seen = rules_of(rows) != frozen_rules().tag
+    run = " in a run that was seen before the rules were frozen" if was_seen else ""
+    return f"Of the paper's {total} claims, judged by the true poses{run}: {'; '.join(parts)}."
 
 
 def _printed(before: pd.DataFrame, after: pd.DataFrame) -> str:
