@@ -117,6 +117,20 @@ def test_a_page_names_run_seed_verdicts_and_what_is_open(tmp_path, monkeypatch):
     assert "What would decide" not in fresh_claims(tmp_path)
 
 
+def test_what_is_trained_asks_for_more_runs_and_what_is_counted_for_more_batches(tmp_path):
+    open_ones = [(name, "verdict_true", str(Verdict.UNDECIDED)) for name in ("C3", "C4")]
+    changes = [*open_ones, ("C3", "seeds", "3"), ("C4", "seeds", "")]
+    publish_copy(tmp_path, "labels", changes, seed="1")
+    with (BENCHMARKS / "plan_labels.csv").open(newline="") as file:
+        train = next(row for row in csv.DictReader(file) if row["name"] == "train")
+    left = fresh_claims(tmp_path).split("What would decide the others")[1].splitlines()
+    (runs,) = (line for line in left if "more training runs per cell of `labels`" in line)
+    assert "C3" in runs
+    assert "C4" not in runs
+    assert f"{float(train['cpu_s']) / 3600:.1f} hours" in runs
+    assert "- C4: more batches than `labels` has." in left
+
+
 # Table that a claim is about.
 TABLES = {
     "C1": "table2_ground_truth",
