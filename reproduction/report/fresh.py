@@ -173,7 +173,10 @@ def _verdicts(judged: Sequence[Judged]) -> str:
     """Name the verdicts on one claim, and the runs where there are several."""
     if len(judged) == 1:
         return judged[0].verdict
-    return " and ".join(f"{own.verdict} (`{own.profile}`)" for own in judged)
+    runs: dict[str, list[str]] = {}
+    for own in judged:
+        runs.setdefault(own.verdict, []).append(f"`{own.profile}`")
+    return " and ".join(f"{verdict} ({', '.join(names)})" for verdict, names in runs.items())
 
 
 def _runs(published: Path, judged: Mapping[str, Sequence[Judged]]) -> str:

@@ -86,7 +86,7 @@ def test_no_verdict_of_several_runs_is_passed_over(tmp_path):
     text = fresh_claims(tmp_path)
     assert all(text.count(f"| `{profile}` |") for profile in ("labels", "a", "b"))
     assert "holds (`b`)" in text
-    assert "undecided (`a`)" in text
+    assert "undecided (`labels`, `a`)" in text
     assert "C2" not in text.split("What would decide the others")[1]
 
 
