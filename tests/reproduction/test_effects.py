@@ -17,6 +17,7 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.dataset.render_sequence import drawn, effects_of
 from synfeal.dataset.sevenscenes import frame_paths, read_split
 from synfeal.effects import light as effects
+from synfeal.effects.files import LIGHT_GROUPS
 from synfeal.effects.scene import open_scene
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
@@ -153,7 +154,7 @@ def test_lights_add_up_in_linear_light(tmp_path):
     surface = surface_of(np.random.default_rng(0), patches, 0.4)
     count = len(surface.points_m)
     dull = np.full((count, 3), 0.5, np.float32), np.zeros(count, np.float32)
-    parts = [received(surface, *dull, lighting.of_group(group)) for group in effects.GROUPS]
+    parts = [received(surface, *dull, lighting.of_group(group)) for group in LIGHT_GROUPS]
     np.testing.assert_allclose(sum(parts), received(surface, *dull, lighting), rtol=1e-5)
     assert all(part.max() > 0.05 for part in parts)
 
