@@ -112,8 +112,8 @@ def judged_fresh(published: Path = PUBLISHED) -> dict[str, list[Judged]]:
     Args:
         published: Folder of the published runs.
     """
-    found: dict[str, list[Judged]] = {claim.id: [] for claim in claims_to_test()}
     claims = {claim.id: claim for claim in claims_to_test()}
+    found: dict[str, list[Judged]] = {name: [] for name in claims}
     for root in sorted(path.parent for path in published.glob("*/claims.csv")):
         rows = read_published(root)
         if is_fresh(rows):
@@ -192,6 +192,7 @@ def _runs(published: Path, judged: Mapping[str, Sequence[Judged]]) -> str:
 def _open(judged: Mapping[str, Sequence[Judged]]) -> str:
     """List the claims that no fresh seed has decided, by the run that would."""
     items = []
+    made = {found.profile for own in judged.values() for found in own}
     for run in RUNS:
         left = [name for name in run.claims if not is_decided(judged.get(name, ()))]
         own = [f for name in left for f in judged.get(name, ()) if f.profile == run.profile]
@@ -204,9 +205,9 @@ def _open(judged: Mapping[str, Sequence[Judged]]) -> str:
             )
         if counted := [found.claim.id for found in own if not found.row["seeds"]]:
             items.append(f"- {', '.join(counted)}: more batches than `{run.profile}` has.")
-        if unjudged := [name for name in left if name not in judged]:
+        if waiting := [name for name in left if name not in judged or run.profile not in made]:
             items.append(
-                f"- {', '.join(unjudged)}: profile `{run.profile}`, planned at"
+                f"- {', '.join(waiting)}: profile `{run.profile}`, planned at"
                 f" {planned_hours(run):.1f} hours of processor time"
                 f" ([plan](../results/benchmarks/plan_{run.profile}.csv))."
             )

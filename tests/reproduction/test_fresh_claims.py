@@ -131,6 +131,14 @@ def test_what_is_trained_asks_for_more_runs_and_what_is_counted_for_more_batches
     assert "- C4: more batches than `labels` has." in left
 
 
+def test_a_second_run_for_an_open_claim_is_listed_until_it_is_made(tmp_path):
+    changes = [("C13", "verdict_true", str(Verdict.UNDECIDED))]
+    publish_copy(tmp_path, "transfer", changes, seed="1")
+    assert "profile `curves`" in fresh_claims(tmp_path)
+    publish_copy(tmp_path, "curves", changes, seed="2")
+    assert "profile `curves`" not in fresh_claims(tmp_path)
+
+
 # Table that a claim is about.
 TABLES = {
     "C1": "table2_ground_truth",
