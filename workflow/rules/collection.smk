@@ -153,7 +153,10 @@ rule render:
 # How much of its light comes from where: for light states, of stand-ins alone.
 rule light_shares:
     output:
-        shares=[f"{ROOT}/scenes/{{scene}}/light_{group}.glb" for group in LIGHT_GROUPS],
+        shares=[
+            file.as_posix()
+            for file in light_share_files(Path(rules.scene.output.mesh)).values()
+        ],
     log:
         f"{ROOT}/logs/light_shares/{{scene}}.log",
     benchmark:

@@ -25,7 +25,7 @@ from reproduction.design.runs import training_parameters
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.config.load import read_yaml
 from synfeal.dataset.frame_files import SUFFIX
-from synfeal.effects.files import LIGHT_GROUPS
+from synfeal.effects.files import light_share_files
 from synfeal.errors import InputError
 from synfeal.records.lock import begin_run
 from synfeal.records.provenance import config_hash, seed_of
