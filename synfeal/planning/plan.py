@@ -21,6 +21,7 @@ from synfeal.planning.repeat import repeated_poses
 from synfeal.planning.space import PoseSpace, sample_start
 
 Array = NDArray[np.float64]
+MOST_DEAD_ENDS = 100  # targets in a row that lead nowhere; then the place itself is one
 MOST_OF_PATH = 10**6  # frames: the whole path is planned, however few of it are asked for
 
 
@@ -232,21 +233,41 @@ class _Turns:
 
 
 def _walk(space: PoseSpace, collection: CollectionConfig) -> Iterator[Array]:
-    """Yield poses (n, 4, 4) of connected paths through one box: each begins where one ended."""
-    at = sample_start(space, collection.max_tries)  # itself no frame
+    """Yield poses (n, 4, 4) of connected paths through one box: each begins where one ended.
+
+    A path is taken once another is known to lead on from its end. The paper does not say what
+    happens where none does: beside a table leg nearly every straight way is blocked, and a camera
+    that has flown there would stay there. Another target is chosen instead.
+    """
     stream = CandidateStream(space, collection.candidates, collection.frame_spacing_m)
-    while True:
-        target = stream.next_target(at, collection.min_path_m, collection.max_tries)
-        if target is None:
-            where = ", ".join(f"{value:.2f}" for value in at[:3])
-            raise InputError(
-                f"plan: no admissible target from ({where}) in {collection.max_tries} rounds of"
-                f" {collection.candidates} candidates; lower min_path_m ({collection.min_path_m} m)"
-                f" or min_view_distance_m ({space.min_view_distance_m} m){_or_clearance(space)},"
-                " or widen sampling_box"
-            )
-        yield path_poses(at, target, collection.frame_spacing_m, collection.interpolation)
-        at = target
+
+    def target_from(start: Array) -> Array | None:
+        return stream.next_target(start, collection.min_path_m, collection.max_tries)
+
+    at = sample_start(space, collection.max_tries)  # itself no frame
+    target = target_from(at)
+    if target is None:
+        raise _stuck(at, space, collection)
+    dead_ends = 0
+    while dead_ends < MOST_DEAD_ENDS:
+        onward = None if target is None else target_from(target)
+        if target is None or onward is None:
+            target, dead_ends = target_from(at), dead_ends + 1
+        else:
+            yield path_poses(at, target, collection.frame_spacing_m, collection.interpolation)
+            at, target, dead_ends = target, onward, 0
+    raise _stuck(at, space, collection)
+
+
+def _stuck(at: Array, space: PoseSpace, collection: CollectionConfig) -> InputError:
+    """Return the error that no path leads on from a pose vector (6,)."""
+    where = ", ".join(f"{value:.2f}" for value in at[:3])
+    return InputError(
+        f"plan: no admissible target from ({where}) in {collection.max_tries} rounds of"
+        f" {collection.candidates} candidates; lower min_path_m ({collection.min_path_m} m)"
+        f" or min_view_distance_m ({space.min_view_distance_m} m){_or_clearance(space)},"
+        " or widen sampling_box"
+    )
 
 
 def _or_clearance(space: PoseSpace) -> str:

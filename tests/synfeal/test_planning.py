@@ -120,6 +120,24 @@ def test_dead_end_names_the_place_and_what_to_relax(furnished):
         plan_split(furnished, ROOM, SCENE, collection, 1, np.random.default_rng(0))
 
 
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_no_path_ends_where_none_leads_on(furnished, seed):
+    """So few tries that many places are dead ends: each is passed over."""
+    collection = CollectionConfig(candidates=1, max_tries=20, frame_spacing_m=0.25, min_path_m=2.0)
+
+    def planned(n_frames):
+        rng = np.random.default_rng(seed)
+        return plan_split(furnished, ROOM, SCENE, collection, n_frames, rng)
+
+    table = planned(600)
+    ends = table.position_m[np.flatnonzero(np.diff(table.path))]
+    assert len(ends) > 20
+    assert (np.linalg.norm(np.diff(ends, axis=0), axis=1) >= 2.0).all()
+    assert furnished.sees(ends[:-1], ends[1:]).all()
+    for n_frames in (1, 37, 300):  # a plan that stops at a dead end is no other than a longer one
+        np.testing.assert_array_equal(planned(n_frames).position_m, table.position_m[:n_frames])
+
+
 @few
 @given(vectors(50.0), vectors(50.0), st.tuples(*[st.floats(-90, 0)] * 3), st.floats(0, 90))
 def test_bounds_are_the_box_and_the_angles_in_radians(a, b, low, width):
