@@ -54,6 +54,7 @@ RUNS = (
     JudgingRun("sanctuary", ("C8",)),
     JudgingRun("transfer", ("C10", "C13")),
     JudgingRun("curves", ("C13",)),
+    JudgingRun("scratch", ("C10",)),
     JudgingRun("tracking", ("C15",)),
 )
 
