@@ -168,8 +168,10 @@ def test_the_codes_dose_is_tried_on_nights_table_3_with_fresh_seeds():
     assert (night.groundtruth.noise_dose, dose.groundtruth.noise_dose) == ("text", "code")
     assert read_design(dose).rows == tuple(read_design(night).rows_of("table3_inconsistencies"))
     assert read_design(dose).repetitions["default"] == 3
-    for part in ("scenes", "collection", "render", "network", "network_camera", "localizers"):
+    for part in ("scenes", "render", "network", "network_camera", "localizers"):
         assert getattr(dose, part) == getattr(night, part), part
+    spread = {"test_paths": dose.collection.test_paths}  # the same frames to learn from
+    assert dose.collection == night.collection.model_copy(update=spread)
     assert (dose.scale, dose.pretraining) == (night.scale, night.pretraining)
     alike = {"repetitions": {}, "samples_seen": {}}
     trainings = (c.training.model_copy(update=alike) for c in (night, dose))
