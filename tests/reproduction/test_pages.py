@@ -74,6 +74,21 @@ def test_changing_a_result_changes_the_text(root, part, file, column, value, sho
     assert shown in PARTS[part](root)
 
 
+def test_noise_is_told_as_changes_from_no_noise(root):
+    path = root / "tables/table3_inconsistencies.csv"
+    cells = pd.read_csv(path)
+    scores = ["position_m", "yardstick_position_m", "position_m_true", "published_position_m"]
+    cells.loc[cells.block == "position", [scores[0], *scores[2:]]] = 0.4  # without noise, too
+    most = (cells.block == "position") & (cells.noise_m == 0.3)
+    cells.loc[most, scores] = [0.5, 0.48, 0.44, 0.8]
+    cells.loc[most & (cells.model == "posenet2"), scores] = [0.6, 0.52, 0.40, 4.0]
+    cells.loc[most & (cells.model == "posenet2"), "published_flag"] = "misprint"
+    cells.to_csv(path, index=False)
+    told = next(line for line in PARTS["noise"](root).splitlines() if "| 0.30 m |" in line)
+    assert re.findall(r"p ([+-]\d+) %", told) == ["+100", "+30", "+22", "+8"]
+    assert "| 0.30 m and 20° |" in PARTS["noise"](root)
+
+
 def test_parts_are_replaced_and_nothing_else():
     text = "a\n<!-- x mini -->\nold\n<!-- /x -->\nb <!-- y -->\n<!-- x night -->\n<!-- /x -->\n"
     once = rewritten(text, lambda name, profile: f"\\1 {name} of {profile}")
