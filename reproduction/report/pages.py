@@ -137,7 +137,7 @@ def noise_table(root: Path) -> str:
             before = noisy[f"{clean.format(quantity)}_clean"]
             noisy[letter] = 100 * (noisy[own.format(quantity)] / before - 1)
         means = levels[list(QUANTITIES.values())].mean()
-        table[heading] = [f"p {row.p:+.0f} %, o {row.o:+.0f} %" for row in rows_of(means)]
+        table[heading] = [f"p {round(row.p):+d} %, o {round(row.o):+d} %" for row in rows_of(means)]
     return markdown_table(pd.DataFrame(table))
 
 
