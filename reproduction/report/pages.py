@@ -137,7 +137,7 @@ def noise_table(root: Path) -> str:
             before = noisy[f"{clean.format(quantity)}_clean"]
             noisy[letter] = 100 * (noisy[own.format(quantity)] / before - 1)
         means = levels[list(QUANTITIES.values())].mean()
-        table[heading] = [f"p {round(row.p):+d} %, o {round(row.o):+d} %" for row in rows_of(means)]
+        table[heading] = [f"p {_change(row.p)}, o {_change(row.o)}" for row in rows_of(means)]
     return markdown_table(pd.DataFrame(table))
 
 
@@ -228,6 +228,11 @@ def _localizer_table(cells: pd.DataFrame, heading: str, labels: pd.Series) -> st
     table = cells.assign(row=labels, text=texts).pivot(index="row", columns="model", values="text")
     table = table.loc[labels.unique(), list(MODELS)].rename(columns=TITLES)
     return markdown_table(table.rename_axis(index=heading).reset_index())
+
+
+def _change(percent: float) -> str:
+    """Format a change; the paper has none for rows of our own."""
+    return "–" if math.isnan(percent) else f"{round(percent):+d} %"
 
 
 def _noise_level(row: Any) -> str:
