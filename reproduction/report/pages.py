@@ -50,12 +50,12 @@ REAL_PAGE, REAL = Path("docs/real.md"), "real"
 FIGURE = Path("docs/images/findings.png")
 HEADLINES = ("night", "mini")
 LIMITS_NOTE = (
-    "Brackets hold 95 % limits over test paths and training runs. Some changes are also judged as"
-    " claims, which compare errors frame by frame, and have their limits from there: the first in"
-    " the third finding ([claims]({claims})), the effect of size in the fourth and the changes of"
-    " PoseNet2 in the fifth ([with fresh seeds]({claims}-judged-with-fresh-seeds)). Limits of other"
-    " changes are computed as if the two errors had been measured on different frames, which makes"
-    " them wide."
+    "Brackets hold 95 % limits over test paths and training runs. The changes with independent"
+    " noise in the labels and with the size of the data set, and those of PoseNet2, are also judged"
+    " as claims, which compare errors frame by frame, and have their limits from there ([this run's"
+    " claims]({claims}), [claims with fresh seeds]({claims}-judged-with-fresh-seeds)). Limits of"
+    " other changes are computed as if the two errors had been measured on different frames, which"
+    " makes them wide."
 )
 PAPER_FRAMES = {"6k": 6000}
 QUANTITIES = {"position_m": "p", "orientation_deg": "o"}

@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 
 from reproduction.claims.rules import frozen_rules
 from reproduction.claims.table import verdict_counts
@@ -88,7 +89,13 @@ def rules_note(rows: Sequence[Row], root: Path) -> str:
     )
 
 
-def interval_in(rows: Sequence[Row], claim: str, part: str, place: int) -> Interval | None:
+def interval_in(
+    rows: Sequence[Row],
+    claim: str,
+    part: str,
+    place: int,
+    score: Literal["labels", "true"] = "true",
+) -> Interval | None:
     """Return a change that a claim was judged by, as a factor; None where it was not.
 
     Args:
@@ -96,17 +103,17 @@ def interval_in(rows: Sequence[Row], claim: str, part: str, place: int) -> Inter
         claim: Id of the claim.
         part: Text before the changes, as in ``both: p ...``; empty where there is none.
         place: 0 for the position, 1 for the orientation.
+        score: What errors are measured against.
     """
     found = {row["id"]: row for row in rows}.get(claim)
-    if found is None or not found.get("interval_true"):
+    if found is None or not found.get(f"interval_{score}"):
         return None
     before = f"{re.escape(part)}: " if part else ""
+    measured, interval = found[f"measured_{score}"], found[f"interval_{score}"]
     number = r"([+-][\d.]+) %"
     letter = "po"[place]
-    value = re.search(rf"(?:^|; ){before}(?:p [^;(]*?)?\b{letter} {number}", found["measured_true"])
-    ends = re.search(
-        rf"(?:^|; ){before}(?:p [^;]*?)?\b{letter} {number} to {number}", found["interval_true"]
-    )
+    value = re.search(rf"(?:^|; ){before}(?:p [^;(]*?)?\b{letter} {number}", measured)
+    ends = re.search(rf"(?:^|; ){before}(?:p [^;]*?)?\b{letter} {number} to {number}", interval)
     if value is None or ends is None:
         return None
     return Interval(*(1 + float(text) / 100 for text in (value[1], ends[1], ends[2])))

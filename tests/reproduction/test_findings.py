@@ -17,6 +17,7 @@ from reproduction.report.findings import (
     findings,
     fresh_run,
     more_frames_help,
+    noise_is_mostly_the_yardsticks,
     sentences,
 )
 from reproduction.report.intervals import Interval, cell_interval, mean_change
@@ -141,6 +142,46 @@ def test_shapes_of_label_errors(told):
         assert expected[2] < low < value < high
 
 
+def test_noise_and_the_yardstick(told):
+    finding, root = told["noise_is_mostly_the_yardsticks"], NIGHT.with_name("dose")
+    assert finding.run == root.name
+    cells = table("table3_inconsistencies", root).query("block == 'both'").set_index("model")
+    clean, noisy = cells[cells.noise_m == 0], cells[cells.noise_m == 0.3]
+    scores = [("", ""), ("yardstick_", ""), ("published_", "published_")]
+    seen, alone, printed = (
+        [
+            100 * (noisy[own + m] / clean[of + m] - 1).mean()
+            for m in ("position_m", "orientation_deg")
+        ]
+        for own, of in scores
+    )
+    harm = [100 * (noisy[m] / clean[m] - 1).mean() for m in (POSITION, ORIENTATION)]
+    moved_cm, moved_deg, *told_numbers = numbers(finding.evidence)
+    assert (moved_cm, moved_deg) == (round(30 * 3**0.5), 20)
+    places = {0: seen[0], 3: seen[1], 6: printed[0], 7: printed[1], 8: alone[0], 9: alone[1]}
+    places |= {10: harm[0], 13: harm[1]}
+    for place, value in places.items():
+        assert told_numbers[place] == pytest.approx(value, abs=0.6), place
+    claims = {row["id"]: row for _, row in read_records(root / "claims.csv")}
+    for start, score in ((0, "labels"), (10, "true")):
+        ends = numbers(claims["C5"][f"interval_{score}"].split("both: ")[1])
+        found = [told_numbers[start + place] for place in (1, 2, 4, 5)]
+        assert found == pytest.approx(ends, abs=0.51)
+    # Most of it is the yardstick: more than half of either change.
+    assert alone[0] > seen[0] / 2
+    assert alone[1] > seen[1] / 2
+
+
+def test_no_yardstick_is_blamed_that_does_less_than_half(tmp_path):
+    root = Path(shutil.copytree(NIGHT.with_name("dose"), tmp_path / "dose"))
+    path = root / "tables/table3_inconsistencies.csv"
+    cells = pd.read_csv(path)
+    assert noise_is_mostly_the_yardsticks(root)
+    cells["yardstick_orientation_deg"] *= 0.6
+    cells.to_csv(path, index=False)
+    assert noise_is_mostly_the_yardsticks(root) is None
+
+
 def judged(root, claim):
     """Changes of both errors in percent, each with its limits, as a claim was judged by them."""
     row = {row["id"]: row for _, row in read_records(root / "claims.csv")}[claim]
@@ -254,8 +295,8 @@ def test_labels_are_told_by_a_published_run_with_fresh_seeds(tmp_path, folder, s
 
 def test_sentences_name_the_metres_that_labels_truly_moved_by(tmp_path):
     root = tmp_path / "published/night"
-    for path in (NIGHT, NIGHT.with_name("labels"), NIGHT.with_name("controls")):
-        shutil.copytree(path, root.with_name(path.name))
+    for name in ("night", "labels", "dose", "controls"):
+        shutil.copytree(NIGHT.with_name(name), root.with_name(name))
     path = root / "tables/table3_inconsistencies.csv"
     cells = pd.read_csv(path)
     cells.assign(moved_m=3**0.5 * cells.noise_m).to_csv(path, index=False)
@@ -277,11 +318,12 @@ def test_sentences_follow_the_results(tmp_path):
     cells.to_csv(path, index=False)
     before, after = (findings(r)[2].evidence for r in (NIGHT, root))
     old, new = (numbers(text)[8] for text in (before, after))
+    found = len(findings(root))
     assert 1 + new / 100 == pytest.approx(2 * (1 + old / 100), abs=0.02)
     # Where bent space does no more harm than noise, nothing is found.
     cells.loc[bent, ends] /= 4
     cells.to_csv(path, index=False)
-    assert len(findings(root)) == len(findings(NIGHT)) - 1
+    assert len(findings(root)) == found - 1
     path.unlink()
     assert not can_tell(root)
     assert can_tell(NIGHT)
