@@ -114,7 +114,15 @@ def references_table(design: Design, references: ReferencesConfig, root: Path) -
         keys = dict(zip(KEYS, (*key, row.noise_m, row.noise_deg), strict=False))
         keys[MOVED] = design.moved_m(row)
         methods = answered_by(design.rows, key, references)
-        any_run = read_metrics(folder / methods[0] / "metrics.json")  # holds the mean pose's scores
+        models = MODELS if key in trained else ()
+        runs = {
+            model: [root / "runs" / run.directory for run in design.runs_of(row.pretrained, model)]
+            for model in models
+        }
+        folders = [*(folder / method for method in methods), *(own[0] for own in runs.values())]
+        if not folders:
+            continue
+        any_run = read_metrics(folders[0] / "metrics.json")  # holds the mean pose's scores
         constant = {measure: any_run[f"baseline_{measure}"] for measure in MEASURES}
         counts = {"n_train": any_run["n_train"], "n_test": any_run["n_test"], "n_seeds": 1}
         records.append({**keys, **CONSTANT, **constant, **counts})
@@ -122,10 +130,9 @@ def references_table(design: Design, references: ReferencesConfig, root: Path) -
             kind = "reference" if method in REFERENCES else "external"
             names = {**keys, "method": method, "title": titles[method], "kind": kind}
             records.append(names | _record([folder / method]) | _seconds(folder / method))
-        for model in MODELS if key in trained else ():
-            runs = [root / "runs" / r.directory for r in design.runs_of(row.pretrained, model)]
+        for model, own in runs.items():
             names = {**keys, "method": model, "title": titles[model], "kind": LOCALIZER}
-            records.append(names | _record(runs))
+            records.append(names | _record(own))
     return frame_of(records, SCHEMA)
 
 

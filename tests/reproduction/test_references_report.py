@@ -3,6 +3,7 @@
 import xml.etree.ElementTree as ET
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from baselines.config.learning import MODELS
@@ -116,6 +117,17 @@ def test_the_table_has_a_row_per_data_set_and_method_and_all_are_shown(table, ro
     drawn = {line.get_label(): line.get_ydata() for line in upper.lines}
     assert list(drawn[REFERENCES["structure-depth"].title]) == list(STRUCTURE_M)
     assert len(lower.lines) == len(drawn) == len(REFERENCES) + len(MODELS) + 2
+
+
+def test_a_run_without_reference_methods_has_the_mean_pose_and_its_localizers(table, root):
+    whole = Design(rows=design(), repetitions={"default": 1})
+    out = root / "tables" / "alone"
+    none = ReferencesConfig(groups=())
+    write_references_table(whole, none, root, out.with_suffix(".csv"), out.with_suffix(".tex"))
+    alone = read_references(out.with_suffix(".csv"))
+    own = table[table.method.isin({*MODELS, "constant"})]
+    pd.testing.assert_frame_equal(alone, own.reset_index(drop=True))
+    assert "Mean training pose" in out.with_suffix(".tex").read_text()
 
 
 def test_the_finding_counts_the_localizers_that_are_closer(table):
