@@ -22,7 +22,14 @@ import pandas as pd
 from baselines.config.learning import MODELS
 from reproduction.claims.table import claims_markdown
 from reproduction.real.findings import real_findings, real_headline, real_table
-from reproduction.report.findings import can_tell, read_table, sentences, verdict_sentence
+from reproduction.report.findings import (
+    MEASURES,
+    can_tell,
+    noise_changes,
+    read_table,
+    sentences,
+    verdict_sentence,
+)
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
 from reproduction.report.fresh import fresh_claims, fresh_sentence
 from reproduction.report.publish import PUBLISHED, RESULTS
@@ -58,14 +65,11 @@ LIMITS_NOTE = (
     " makes them wide."
 )
 PAPER_FRAMES = {"6k": 6000}
-QUANTITIES = {"position_m": "p", "orientation_deg": "o"}
-# Columns of Table 3, of a row and of the row without noise that it is compared with. The yardstick
-# alone is what localizers that learnt from clean labels score against noisy ones.
-NOISE_SCORES = {
-    "published": ("published_{}", "published_{}"),
-    "against the labels": ("{}", "{}"),
-    "the yardstick alone": ("yardstick_{}", "{}_true"),
-    "against the true poses": ("{}_true", "{}_true"),
+NOISE_HEADINGS = {
+    "published": "published",
+    "labels": "against the labels",
+    "yardstick": "the yardstick alone",
+    "true": "against the true poses",
 }
 SIFT = dict.fromkeys(
     ("covered_share_mean", "covered_share_q10", "covered_share_q90", "keypoints_mean"), NUMBER
@@ -124,20 +128,13 @@ def labels_table(root: Path) -> str:
 
 def noise_table(root: Path) -> str:
     """Format Table 3 as changes from no noise, means over the localizers."""
-    cells = read_table(root, "table3_inconsistencies")
-    printed = [f"published_{quantity}" for quantity in QUANTITIES]
-    cells.loc[cells.published_flag != "none", printed] = math.nan  # a misprint
-    is_clean = (cells.noise_m == 0) & (cells.noise_deg == 0)
-    names = ["block", "model"]
-    noisy = cells[~is_clean].merge(cells[is_clean], on=names, suffixes=("", "_clean"))
-    levels = noisy.groupby(["block", "moved_m", "noise_deg"], sort=False)
-    table = {"noise": [_noise_level(row) for row in rows_of(levels.first().reset_index())]}
-    for heading, (own, clean) in NOISE_SCORES.items():
-        for quantity, letter in QUANTITIES.items():
-            before = noisy[f"{clean.format(quantity)}_clean"]
-            noisy[letter] = 100 * (noisy[own.format(quantity)] / before - 1)
-        means = levels[list(QUANTITIES.values())].mean()
-        table[heading] = [f"p {_change(row.p)}, o {_change(row.o)}" for row in rows_of(means)]
+    rows = rows_of(noise_changes(root))
+    table = {"noise": [_noise_level(row) for row in rows]}
+    for score, heading in NOISE_HEADINGS.items():
+        position, orientation = (
+            [_change(getattr(row, f"{score}_{measure}")) for row in rows] for measure in MEASURES
+        )
+        table[heading] = [f"p {m}, o {deg}" for m, deg in zip(position, orientation, strict=True)]
     return markdown_table(pd.DataFrame(table))
 
 
@@ -230,9 +227,9 @@ def _localizer_table(cells: pd.DataFrame, heading: str, labels: pd.Series) -> st
     return markdown_table(table.rename_axis(index=heading).reset_index())
 
 
-def _change(percent: float) -> str:
-    """Format a change; the paper has none for rows of our own."""
-    return "–" if math.isnan(percent) else f"{round(percent):+d} %"
+def _change(factor: float) -> str:
+    """Format a factor as a change in percent; the paper has none for rows of our own."""
+    return "–" if math.isnan(factor) else f"{round(100 * (factor - 1)):+d} %"
 
 
 def _noise_level(row: Any) -> str:

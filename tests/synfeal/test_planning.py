@@ -138,6 +138,13 @@ def test_no_path_ends_where_none_leads_on(furnished, seed):
         np.testing.assert_array_equal(planned(n_frames).position_m, table.position_m[:n_frames])
 
 
+def test_planning_ends_where_every_target_is_a_dead_end(furnished, monkeypatch):
+    monkeypatch.setattr("synfeal.planning.plan.MOST_DEAD_ENDS", 1)
+    collection = CollectionConfig(candidates=1, max_tries=20, frame_spacing_m=0.25, min_path_m=2.0)
+    with pytest.raises(InputError, match=r"from \(.*\) in 20 rounds of 1 candidates"):
+        plan_split(furnished, ROOM, SCENE, collection, 600, np.random.default_rng(1))
+
+
 @few
 @given(vectors(50.0), vectors(50.0), st.tuples(*[st.floats(-90, 0)] * 3), st.floats(0, 90))
 def test_bounds_are_the_box_and_the_angles_in_radians(a, b, low, width):
