@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from pydantic import Field
 
-from baselines.config.learning import TrainingConfig
+from baselines.config.learning import ModelName, TrainingConfig
 from synfeal.config.collection import Count
 
 TableName = Literal[
@@ -29,8 +29,13 @@ KEYS: Mapping[str, tuple[str, ...]] = {
 }
 assert set(KEYS) == set(get_args(TableName))
 
-# Seeds per run of a table; `default` where a table is not named.
-Repetitions = dict[Literal["default", TableName], Count]
+if TYPE_CHECKING:
+    Repeated = str
+else:
+    Repeated = Literal["default", TableName, ModelName]
+
+# Seeds per run of a table or of a localizer; `default` where neither is named.
+Repetitions = dict[Repeated, Count]
 
 
 class RepeatedTraining(TrainingConfig):
@@ -38,5 +43,6 @@ class RepeatedTraining(TrainingConfig):
 
     repetitions: Repetitions = Field(
         {"default": 1},
-        description="seeds per run, by table; a run that several tables show gets the most",
+        description="seeds per run, by table or localizer; a run that several of them name gets"
+        " the most",
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from baselines.config.learning import MODELS
 from reproduction.config.load import load_config, parse_config
 from reproduction.design.docs import main
 from reproduction.design.experiments import Design, Run, read_design, read_experiments
@@ -100,6 +101,18 @@ def test_a_run_is_repeated_as_often_as_any_of_its_tables_asks():
     assert design.runs_of(first, "posenet")[0] == run
     assert len(design.table_runs("table4_size")) == 3 * 5
     assert set(design_of([first]).runs) < set(design.runs)
+
+
+def test_a_run_is_repeated_as_often_as_its_localizer_asks():
+    rows = (experiment("table2_ground_truth", labels="sfm"), experiment("table2_ground_truth"))
+    asked = {"table2_ground_truth": 2, "posenet": 5, "hourglass": 1}
+    design = Design(rows=rows, repetitions=asked)
+    per_cell = Counter((run.labels, run.model) for run in design.runs)
+    for labels in ("sfm", "synfeal"):
+        found = {model: per_cell[labels, model] for model in MODELS}
+        assert found == {**dict.fromkeys(MODELS, 2), "posenet": 5}
+    assert [run.repetition for run in design.runs_of(rows[0], "posenet")] == [0, 1, 2, 3, 4]
+    assert len(design.table_runs("table2_ground_truth")) == 2 * (5 + 4 * 2)
 
 
 def test_repetitions_of_an_unknown_table_are_refused(tmp_path):

@@ -100,6 +100,29 @@ def test_runs_that_contradict_each_other_leave_a_claim_open(tmp_path):
     assert "C2" in left
 
 
+@pytest.mark.parametrize(
+    ("other", "agree"),
+    [
+        (Verdict.NEGLIGIBLE, True),
+        (Verdict.SMALLER, True),
+        (Verdict.OPPOSITE, True),
+        (Verdict.HOLDS, False),
+        (Verdict.MIXED, False),
+    ],
+)
+def test_a_verdict_below_the_published_effect_bears_out_that_it_is_smaller(tmp_path, other, agree):
+    publish_copy(tmp_path, "a", [("C2", "verdict_true", str(Verdict.LESS))], seed="1")
+    publish_copy(tmp_path, "labels", [("C2", "verdict_true", str(other))], seed="2")
+    assert is_decided(judged_fresh(tmp_path)["C2"]) == agree
+
+
+def test_two_different_verdicts_below_the_published_effect_contradict_each_other(tmp_path):
+    publish_copy(tmp_path, "a", [("C2", "verdict_true", str(Verdict.NEGLIGIBLE))], seed="1")
+    publish_copy(tmp_path, "labels", [("C2", "verdict_true", str(Verdict.OPPOSITE))], seed="2")
+    publish_copy(tmp_path, "c", [("C2", "verdict_true", str(Verdict.LESS))], seed="3")
+    assert not is_decided(judged_fresh(tmp_path)["C2"])
+
+
 def test_a_page_names_run_seed_verdicts_and_what_is_open(tmp_path, monkeypatch):
     monkeypatch.chdir(REPOSITORY)
     every = [(c.id, "verdict_true", str(Verdict.HOLDS)) for c in claims_to_test()]
