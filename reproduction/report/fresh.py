@@ -29,6 +29,8 @@ SEEN_SEED = "0"
 BENCHMARKS = RESULTS / "benchmarks"
 # No chance enters the claims about the set-up, and C9 is not judged (docs/rules.md).
 NOT_DRAWN = ("C9",)
+# Of these it was announced, before their last run, that no other would follow under the same rules.
+NOT_AGAIN = ("C3", "C10")
 # What `measured_true` has beside the changes that are judged.
 BESIDE = re.compile("; (?:sign tests|tau)")
 # Verdicts that say more than *smaller than published*: where one run gives one of them and another
@@ -50,6 +52,7 @@ class JudgingRun(NamedTuple):
     claims: tuple[str, ...]
 
 
+# The last one for a claim is the one to make more of where it stays open.
 RUNS = (
     JudgingRun("labels", ("C1", "C2", "C3", "C4", "C6")),
     JudgingRun("dose", ("C5", "C6")),
@@ -204,8 +207,13 @@ def _open(judged: Mapping[str, Sequence[Judged]]) -> str:
     """List the claims that no fresh seed has decided, by the run that would."""
     items = []
     made = {found.profile for own in judged.values() for found in own}
+    last = {claim: run for run in RUNS for claim in run.claims}
     for run in RUNS:
-        left = [name for name in run.claims if not is_decided(judged.get(name, ()))]
+        left = [
+            name
+            for name in run.claims
+            if last[name] == run and not is_decided(judged.get(name, ()))
+        ]
         own = [f for name in left for f in judged.get(name, ()) if f.profile == run.profile]
         if trained := [found.claim.id for found in own if found.row["seeds"]]:
             items.append(
@@ -216,6 +224,11 @@ def _open(judged: Mapping[str, Sequence[Judged]]) -> str:
             )
         if counted := [found.claim.id for found in own if not found.row["seeds"]]:
             items.append(f"- {', '.join(counted)}: more batches than `{run.profile}` has.")
+        if closed := [found.claim.id for found in own if found.claim.id in NOT_AGAIN]:
+            items[-1] += (
+                f" It was announced, though, that {', '.join(closed)} would not be run again under"
+                " these rules ([rules.md](rules.md))."
+            )
         if waiting := [name for name in left if name not in judged or run.profile not in made]:
             items.append(
                 f"- {', '.join(waiting)}: profile `{run.profile}`, planned at"

@@ -141,14 +141,14 @@ def test_a_page_names_run_seed_verdicts_and_what_is_open(tmp_path, monkeypatch):
 
 
 def test_what_is_trained_asks_for_more_runs_and_what_is_counted_for_more_batches(tmp_path):
-    open_ones = [(name, "verdict_true", str(Verdict.UNDECIDED)) for name in ("C3", "C4")]
-    changes = [*open_ones, ("C3", "seeds", "3"), ("C4", "seeds", "")]
+    open_ones = [(name, "verdict_true", str(Verdict.UNDECIDED)) for name in ("C1", "C4")]
+    changes = [*open_ones, ("C1", "seeds", "3"), ("C4", "seeds", "")]
     publish_copy(tmp_path, "labels", changes, seed="1")
     with (BENCHMARKS / "plan_labels.csv").open(newline="") as file:
         train = next(row for row in csv.DictReader(file) if row["name"] == "train")
     left = fresh_claims(tmp_path).split("What would decide the others")[1].splitlines()
     (runs,) = (line for line in left if "more training runs per cell of `labels`" in line)
-    assert "C3" in runs
+    assert "C1" in runs
     assert "C4" not in runs
     assert f"{float(train['cpu_s']) / 3600:.1f} hours" in runs
     assert "- C4: more batches than `labels` has." in left
@@ -160,6 +160,19 @@ def test_a_second_run_for_an_open_claim_is_listed_until_it_is_made(tmp_path):
     assert "profile `curves`" in fresh_claims(tmp_path)
     publish_copy(tmp_path, "curves", changes, seed="2")
     assert "profile `curves`" not in fresh_claims(tmp_path)
+
+
+def test_a_claim_that_stays_open_is_listed_with_its_last_run_alone(tmp_path):
+    changes = [(name, "verdict_true", str(Verdict.UNDECIDED)) for name in ("C10", "C13")]
+    for seed, profile in enumerate(("transfer", "curves", "scratch"), start=1):
+        publish_copy(tmp_path, profile, changes, seed=str(seed))
+    left = fresh_claims(tmp_path).split("What would decide the others")[1].splitlines()
+    (of_scratch,) = (line for line in left if "C10" in line)
+    assert "training runs per cell of `scratch`" in of_scratch
+    assert "C10 would not be run again" in of_scratch
+    (of_curves,) = (line for line in left if "C13" in line)
+    assert "training runs per cell of `curves`" in of_curves
+    assert "again under" not in of_curves
 
 
 # Table that a claim is about.
