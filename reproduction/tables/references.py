@@ -254,16 +254,16 @@ def crossing_finding(table: pd.DataFrame) -> str:
     localizers = {m: failed.loc[:, [(m, name) for name in MODELS]] for m in TRUE}
     better = [localizers[m].lt(structure[m], axis=0).sum(axis=1) for m in TRUE]
     levels = [f"{noise_m:.3g} m and {noise_deg:g}°" for noise_m, noise_deg in errors.index]
-    parts = [
-        f"{n_m} in position and {n_deg} in orientation at {level}"
+    counts = [
+        f"with noise of {level}, {n_m} in position and {n_deg} in orientation"
         for level, n_m, n_deg in zip(levels, *better, strict=True)
     ]
     best_m, best_deg = (localizers[measure].iloc[0].min() for measure in TRUE)
     sentence = (
         f"{scene_title(str(noisy.scene.iloc[0]))}, {noisy['size'].iloc[0]}: with exact labels"
         f" structure-based poses are off by {_off(*structure.iloc[0])}, the best localizer by"
-        f" {_off(best_m, best_deg)}; of the {len(MODELS)} localizers are closer to the truth than"
-        f" structure on the same noisy labels {', '.join(parts[1:])}."
+        f" {_off(best_m, best_deg)}. This many of the {len(MODELS)} localizers are closer to the"
+        f" truth than structure on the same labels: {'; '.join(counts[1:])}."
     )
     adjusted = [errors.iloc[-1].get((measure, ADJUSTED), np.nan) for measure in TRUE]
     if np.isnan(adjusted).any():  # was not asked, or failed
