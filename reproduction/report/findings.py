@@ -242,7 +242,7 @@ def shared_errors_stay(root: Path) -> Finding | None:
         if path.low > own.high
         else "Label errors that bend space do more harm than errors that differ by frame."
     )
-    parts = [f"{_percent(changes[shape][1])} if {text}" for shape, text in SHAPES.items()]
+    parts = [f"{percent(changes[shape][1])} if {text}" for shape, text in SHAPES.items()]
     return Finding(
         headline,
         f"Labels that are {_noise(moved_by(root))} off change the orientation error, averaged over"
@@ -273,11 +273,11 @@ def noise_is_mostly_the_yardsticks(root: Path) -> Finding | None:
     return Finding(
         "Most of what noise in the labels seems to do is done by the noise of the test labels.",
         f"Labels that are {_noise(moved_by(root))} off change the errors against test labels with"
-        f" the same noise, averaged over the five networks, by {_percent(seen[0])} and"
-        f" {_percent(seen[1])} (in the paper: {' and '.join(map(_change, printed))}). Scored"
+        f" the same noise, averaged over the five networks, by {percent(seen[0])} and"
+        f" {percent(seen[1])} (in the paper: {' and '.join(map(_change, printed))}). Scored"
         f" against such labels, networks that learnt from exact ones seem worse, too, by"
         f" {' and '.join(map(_change, alone))}. Against the true poses the changes are"
-        f" {_percent(harm[0])} and {_percent(harm[1])}.",
+        f" {percent(harm[0])} and {percent(harm[1])}.",
         "labels or truth, as each sentence says",
         "table3_inconsistencies",
         "" if root == asked else root.name,
@@ -340,7 +340,7 @@ def more_frames_help(root: Path) -> Finding | None:
     return Finding(
         "More frames help, and part of that is longer training.",
         f"From {SMALL} to {LARGE} frames of the Large Room the position error changes by"
-        f" {_percent(position)} and the orientation error by {_percent(orientation)}"
+        f" {percent(position)} and the orientation error by {percent(orientation)}"
         f" {_printed(few, many)}. But runs on larger sets are also shown more images, and doubling"
         f" the images alone changes the errors at {SMALL} by {_change(images_m.value)} and"
         f" {_change(images_deg.value)}, which is {low} to {high} % of the effect of size. No"
@@ -376,12 +376,12 @@ def frames_and_images(root: Path, controls: Path) -> Finding | None:
     return Finding(
         headline,
         f"From {SMALL} to {LARGE} frames of the Large Room, shown {shown[SMALL]:,} and"
-        f" {shown[LARGE]:,} images, the position error changes by {_percent(whole[0])} and the"
-        f" orientation error by {_percent(whole[1])} {_printed(few, many)}. Frames alone, shown"
+        f" {shown[LARGE]:,} images, the position error changes by {percent(whole[0])} and the"
+        f" orientation error by {percent(whole[1])} {_printed(few, many)}. Frames alone, shown"
         f" {shown[SMALL]:,} images at either size (at {LARGE} in `{root.name}`), change them by"
-        f" {_percent(frames[0])} and {_percent(frames[1])}. Images alone, {shown[SMALL]:,} instead"
+        f" {percent(frames[0])} and {percent(frames[1])}. Images alone, {shown[SMALL]:,} instead"
         f" of the {shown_before[SMALL]:,} of `{root.name}` at {SMALL}, change them by"
-        f" {_percent(images[0])} and {_percent(images[1])}.",
+        f" {percent(images[0])} and {percent(images[1])}.",
         "labels and truth alike",
         "table4_size",
         controls.name,
@@ -448,8 +448,8 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
         f" the networks by {errors_m.min():.0f} to {errors_m.max():.0f} cm, so these label errors"
         f" can do little. Exact labels change the position and orientation errors, averaged over"
         f" the five networks, by {', '.join(texts)}. With exact labels instead of SfM's, {lower} of"
-        f" {counted} errors are lower{likely}; those of PoseNet2 change by {_percent(single[0])}"
-        f" and {_percent(single[1])} {_printed(*posenet2)}.",
+        f" {counted} errors are lower{likely}; those of PoseNet2 change by {percent(single[0])}"
+        f" and {percent(single[1])} {_printed(*posenet2)}.",
         "the truth",
         "table2_ground_truth",
         "" if root == asked else root.name,
@@ -578,6 +578,7 @@ def _change(factor: float) -> str:
     return f"{change:+d} %".replace("-", "−") if change else "0 %"
 
 
-def _percent(interval: Interval) -> str:
+def percent(interval: Interval) -> str:
+    """Format a factor with its limits as a change in percent."""
     value, low, high = map(_change, interval)
     return f"{value} ({low.removesuffix(' %')} to {high})"

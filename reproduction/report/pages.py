@@ -34,6 +34,7 @@ from reproduction.report.findings_figure import is_drawn_from, panels, write_fin
 from reproduction.report.fresh import fresh_claims, fresh_sentence
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
+from reproduction.report.realisations import realisations_table
 from reproduction.runs.results import read_result
 from reproduction.tables.assistance import SCHEMA as ASSISTANCE
 from reproduction.tables.assistance import TOTAL
@@ -193,6 +194,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "claims": claims,
     # Of all published runs together, whatever profile the mark names.
     "fresh": lambda root: fresh_claims(root.parent),
+    "realisations": lambda root: realisations_table(root.parent),
     "tested": lambda root: fresh_sentence(root.parent),
     "difficulty": lambda root: difficulty(),
     "real": real_findings,

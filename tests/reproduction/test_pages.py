@@ -109,7 +109,7 @@ def test_the_headline_is_of_the_largest_profile_published(root):
 
 
 def test_unknown_parts_and_unpublished_results_are_input_errors(root):
-    of_no_profile = {"difficulty", "fresh", "tested"}
+    of_no_profile = {"difficulty", "fresh", "realisations", "tested"}
     for name in set(PARTS) - of_no_profile:
         with pytest.raises(InputError, match="results/published/paper"):
             part_of(name, "paper")
