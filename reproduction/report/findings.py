@@ -36,7 +36,7 @@ from synfeal.records.tables import Schema, read_frame, rows_of
 
 ROOM, SMALL, LARGE = "large_room", "6k", "80k"
 # Runs with fresh seeds that findings are told by, where they are published.
-LABELS, CONTROLS, DOSE = "labels", "controls", "dose"
+LABELS, CONTROLS, DOSE, MAPS_AND_SHAPES = "labels", "controls", "dose", "shapes"
 MEASURES = ("position_m", "orientation_deg")
 POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
 # What feature matching does without depth: points are where rays of two training frames meet.
@@ -169,6 +169,7 @@ def best(cells: pd.DataFrame) -> Any:
 
 def structure_beats_regression(root: Path) -> Finding | None:
     """Compare feature matching and regression on identical frames with exact labels."""
+    asked, root = root, fresh_run(root, MAPS_AND_SHAPES)
     matched, network = reference(root, WITHOUT_DEPTH), best(localizers(root))
     if matched is None:
         return None
@@ -186,11 +187,13 @@ def structure_beats_regression(root: Path) -> Finding | None:
         f" {_deg(angles[1])}.",
         "labels and truth alike, because these labels are exact",
         "references",
+        _told_by(root, asked),
     )
 
 
 def a_map_beats_exact_labels(root: Path) -> Finding | None:
     """Compare a bundle-adjusted map from noisy labels with regression on exact ones."""
+    asked, root = root, fresh_run(root, MAPS_AND_SHAPES)
     noise = most_noise(root)
     adjusted, network = reference(root, ADJUSTED, noise), best(localizers(root))
     if adjusted is None:
@@ -209,6 +212,7 @@ def a_map_beats_exact_labels(root: Path) -> Finding | None:
         f" {_cm(theirs[0])} and {_deg(theirs[1])}.",
         "the truth",
         "references",
+        _told_by(root, asked),
     )
 
 
@@ -230,6 +234,7 @@ def shape_changes(root: Path) -> dict[str, tuple[Interval, Interval]]:
 
 def shared_errors_stay(root: Path) -> Finding | None:
     """Compare label errors that are independent with those that frames share."""
+    asked, root = root, fresh_run(root, MAPS_AND_SHAPES)
     changes = shape_changes(root)
     if len(changes) < len(SHAPES):
         return None
@@ -249,6 +254,7 @@ def shared_errors_stay(root: Path) -> Finding | None:
         f" the five networks, by {', '.join(parts[:-1])}, and {parts[-1]}.",
         "the truth",
         "table6_label_errors",
+        _told_by(root, asked),
     )
 
 
@@ -280,7 +286,7 @@ def noise_is_mostly_the_yardsticks(root: Path) -> Finding | None:
         f" {percent(harm[0])} and {percent(harm[1])}.",
         "labels or truth, as each sentence says",
         "table3_inconsistencies",
-        "" if root == asked else root.name,
+        _told_by(root, asked),
     )
 
 
@@ -452,7 +458,7 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
         f" and {percent(single[1])} {_printed(*posenet2)}.",
         "the truth",
         "table2_ground_truth",
-        "" if root == asked else root.name,
+        _told_by(root, asked),
     )
 
 
@@ -467,6 +473,11 @@ def fresh_run(root: Path, profile: str) -> Path:
     if root.parent.name != PUBLISHED.name or not (other / "claims.csv").is_file():
         return root
     return other if is_fresh(read_published(other)) else root
+
+
+def _told_by(root: Path, asked: Path) -> str:
+    """Name the run that a finding is of; empty where it is the one that was asked."""
+    return "" if root == asked else root.name
 
 
 def paired_changes(

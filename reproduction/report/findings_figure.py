@@ -17,10 +17,12 @@ from PIL import Image
 from reproduction.figures.style import BLUE, GREEN, RC, VERMILION
 from reproduction.report.findings import (
     ADJUSTED,
+    MAPS_AND_SHAPES,
     POSITION,
     SHAPES,
     WITHOUT_DEPTH,
     best,
+    fresh_run,
     localizers,
     most_noise,
     moved_by,
@@ -61,6 +63,7 @@ def panels(root: Path) -> list[Panel]:
 
     A panel that lacks a row, a value or a limit is left out.
     """
+    root = fresh_run(root, MAPS_AND_SHAPES)
     noise = most_noise(root)
     moved_m, turned_deg = moved_by(root)
     off = f"{100 * moved_m:.0f} cm, {turned_deg:.0f}°"
