@@ -17,7 +17,7 @@ from PIL import Image
 from reproduction.figures.style import BLUE, GREEN, RC, VERMILION
 from reproduction.report.findings import (
     ADJUSTED,
-    MAPS_AND_SHAPES,
+    ERROR_SHAPES,
     POSITION,
     SHAPES,
     WITHOUT_DEPTH,
@@ -63,10 +63,8 @@ def panels(root: Path) -> list[Panel]:
 
     A panel that lacks a row, a value or a limit is left out.
     """
-    root = fresh_run(root, MAPS_AND_SHAPES)
-    noise = most_noise(root)
-    moved_m, turned_deg = moved_by(root)
-    off = f"{100 * moved_m:.0f} cm, {turned_deg:.0f}°"
+    noise, off = most_noise(root), _off(root)
+    by_shape = fresh_run(root, ERROR_SHAPES)
     clean, noisy = best(localizers(root)), best(localizers(root, noise))
     found = {
         "feature map, exact labels": (reference(root, WITHOUT_DEPTH), BOTH, BLUE),
@@ -81,7 +79,7 @@ def panels(root: Path) -> list[Panel]:
     ]
     changes = [
         Row(SHAPES[shape], _change(orientation), TRUTH, VERMILION)
-        for shape, (_, orientation) in shape_changes(root).items()
+        for shape, (_, orientation) in shape_changes(by_shape).items()
     ]
     drawn = []
     if len(errors) == len(found) and _are_finite(errors):
@@ -98,7 +96,7 @@ def panels(root: Path) -> list[Panel]:
     if len(changes) == len(SHAPES) and _are_finite(changes):
         drawn.append(
             Panel(
-                f"3  Labels {off} off: errors of single frames mostly average out, those that\n"
+                f"3  Labels {_off(by_shape)} off: errors of single frames mostly average out, those that\n"
                 "    frames share do not",
                 changes,
                 "change of the networks' orientation error, %, mean over five"
@@ -107,6 +105,12 @@ def panels(root: Path) -> list[Panel]:
             )
         )
     return drawn
+
+
+def _off(root: Path) -> str:
+    """Say how far off the labels with the most noise are."""
+    moved_m, turned_deg = moved_by(root)
+    return f"{100 * moved_m:.0f} cm, {turned_deg:.0f}°"
 
 
 def _are_finite(rows: Sequence[Row]) -> bool:
