@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import math
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -28,6 +29,7 @@ from reproduction.report.findings import (
     moved_by,
     reference,
     shape_changes,
+    shared_errors_stay,
 )
 from reproduction.report.intervals import Interval, cell_interval
 from reproduction.tables.layouts import TITLES
@@ -38,6 +40,7 @@ DPI = 150
 SOURCE = "Source"  # of the picture: what it was drawn from
 TRUTH = "against the truth"
 BOTH = "against truth = labels"
+TITLE_CHARACTERS = 84  # in a line
 
 
 class Row(NamedTuple):
@@ -96,8 +99,7 @@ def panels(root: Path) -> list[Panel]:
     if len(changes) == len(SHAPES) and _are_finite(changes):
         drawn.append(
             Panel(
-                f"3  Labels {_off(by_shape)} off: errors of single frames mostly average out, those that\n"
-                "    frames share do not",
+                _title_of_shapes(root, _off(by_shape)),
                 changes,
                 "change of the networks' orientation error, %, mean over five"
                 " (0: labels do no harm)",
@@ -105,6 +107,15 @@ def panels(root: Path) -> list[Panel]:
             )
         )
     return drawn
+
+
+def _title_of_shapes(root: Path, off: str) -> str:
+    """Say what the third finding says, over two lines; without a finding, what is shown."""
+    finding = shared_errors_stay(root)
+    said = finding.headline.removesuffix(".") if finding else "Label errors by their shape"
+    return textwrap.fill(
+        f"3  {said} (labels {off} off)", TITLE_CHARACTERS, subsequent_indent="    "
+    )
 
 
 def _off(root: Path) -> str:

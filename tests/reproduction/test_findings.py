@@ -329,7 +329,7 @@ def test_sentences_name_the_metres_that_labels_truly_moved_by(tmp_path):
     assert expected != sentences(NIGHT)
     assert sentences(root) == expected
     drawn = [panel.title for panel in findings_figure.panels(root)]
-    assert any("Labels 52 cm, 20° off" in title for title in drawn)
+    assert any("labels 52 cm, 20° off" in " ".join(title.split()) for title in drawn)
 
 
 def test_sentences_follow_the_results(tmp_path):
@@ -416,6 +416,8 @@ def test_the_figure_shows_what_the_findings_say(tmp_path):
     assert [round(row.interval.value) for row in changes.rows] == numbers(
         findings(NIGHT)[2].evidence
     )[2::3]
+    third = findings(NIGHT)[2].headline.removesuffix(".")
+    assert f"3 {third} (labels 30 cm, 20° off)" == " ".join(changes.title.split())
     assert all("truth" in row.against for panel in drawn for row in panel.rows)
     out = tmp_path / "findings.png"
     findings_figure.write_findings_figure(drawn, out)
