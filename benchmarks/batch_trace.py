@@ -1,10 +1,11 @@
-"""Frames that structure from motion loses in a batch: a picture of what it had to see.
+"""Where an estimated batch goes wrong: a picture of what there was to see, and of the errors.
 
     python -m benchmarks.batch_trace results/benchmarks/sfm_trace --scene large_room --batch 18 \
         --trajectory before=before.csv --trajectory after=after.csv
 
 writes ``<stem>.csv`` and ``<stem>.png``: frame by frame the distance to the nearest surface, the
-number of features, usual and weak, and whether each of some trajectories has the frame.
+number of features, usual and weak, and of each of some trajectories whether it has the frame, and
+how far off it is there.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ import pycolmap
 from matplotlib.figure import Figure
 
 from baselines.labels.batches import link_images, read_trajectory
+from baselines.labels.chain import fill_gaps
 from baselines.labels.sfm.features import extract_features
 from benchmarks.label_batches import Files, frames_of
 from reproduction.config.load import load_config
 from reproduction.config.profile import Config
+from synfeal.geometry.poses import pose_error, relative
 from synfeal.mesh.clearance import cut_to_size, point_triangle_distances
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.records.tables import write_frame
@@ -58,17 +61,18 @@ def nearest_surface_m(points_m: np.ndarray, collision: Path) -> np.ndarray:
 
 
 def draw(trace: pd.DataFrame, names: list[str], title: str) -> Figure:
-    """Draw distance, features and registered frames below each other.
+    """Draw distance, features, errors and registered frames below each other.
 
     Args:
         trace: A row per frame, with the columns of the CSV.
-        names: Names of the trajectories, each with a column ``registered_<name>``.
+        names: Names of the trajectories, each with columns ``registered_<name>`` and
+            ``error_<name>_m``.
         title: Title of the figure.
     """
-    figure = Figure(figsize=(9.0, 5.5), layout="constrained")
+    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
     figure.suptitle(title)
-    heights = [2, 2, 0.4 * len(names)]
-    near, seen, found = figure.subplots(3, 1, sharex=True, height_ratios=heights)
+    heights = [2, 2, 2, 0.4 * len(names)]
+    near, seen, off, found = figure.subplots(4, 1, sharex=True, height_ratios=heights)
     near.plot(trace.frame, 100 * trace.nearest_surface_m, color="0.2")
     near.set_ylabel("nearest surface (cm)")
     near.set_ylim(bottom=0)
@@ -78,6 +82,12 @@ def draw(trace: pd.DataFrame, names: list[str], title: str) -> Figure:
     seen.set_ylim(bottom=0)
     seen.set_ylabel("features")
     seen.legend(loc="lower left")
+    for name in names:
+        off.plot(trace.frame, 100 * trace[f"error_{name}_m"], label=name)
+    off.set_yscale("symlog", linthresh=1)
+    off.set_ylim(bottom=0)
+    off.set_ylabel("position error (cm)")
+    off.legend(loc="upper left")
     for row, name in enumerate(names):
         there = trace[f"registered_{name}"].to_numpy() == 1
         found.fill_between(trace.frame, row + 0.1, row + 0.9, where=there, step="mid")
@@ -113,7 +123,10 @@ def main() -> None:
     for given in args.trajectory:
         name, _, path = given.partition("=")
         names.append(name)
-        columns[f"registered_{name}"] = read_trajectory(Path(path)).registered.astype(int)
+        trajectory = read_trajectory(Path(path))
+        columns[f"registered_{name}"] = trajectory.registered.astype(int)
+        true = relative(world_from_cam[0], world_from_cam)
+        columns[f"error_{name}_m"] = pose_error(fill_gaps(trajectory), true)[0]
     trace = pd.DataFrame(columns)
     write_frame(args.stem.with_suffix(".csv"), trace, "%.4g")
     draw(trace, names, f"{args.scene}, batch {args.batch}").savefig(

@@ -5,20 +5,25 @@
 
 estimates batches of the training set that a profile's results hold, places each as if the batch
 before it had ended at its true pose, and adds a row for each to a table. With ``PYTHONPATH`` set to
-a checkout of another version the same frames are measured with that version's code.
+a checkout of another version the same frames are measured with that version's code. ``--set`` gives
+SfM other settings than the profile's, and ``--made`` takes the estimates of the profile's run.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import yaml
 
-from baselines.labels.batches import BatchTrajectory, batches_of
+from baselines.config.labels import SfmConfig
+from baselines.labels.batches import BatchTrajectory, batches_of, read_trajectory
 from baselines.labels.chain import fill_gaps
 from baselines.labels.kinect_fusion import kinect_fusion_batch
 from baselines.labels.sfm import sfm_batch
@@ -81,6 +86,25 @@ def estimate(
     return trajectory, {}, time.process_time() - began
 
 
+def made(
+    root: Path, method: str, scene: str, index: int
+) -> tuple[BatchTrajectory, dict[str, Any], float]:
+    """Read the estimate of a batch that a run has made, with facts and processor seconds."""
+    stem = root / "groundtruth" / scene / SIZE / method / SPLIT / f"batch-{index:03d}"
+    facts = json.loads(stem.with_suffix(".json").read_text())
+    took_s = sum(value for name, value in facts.items() if name.endswith("_s"))
+    return read_trajectory(stem.with_suffix(".csv")), facts, took_s
+
+
+def with_settings(config: Config, given: Sequence[str]) -> Config:
+    """Replace settings of SfM by those given as ``name=value``."""
+    parts = (setting.partition("=") for setting in given)
+    settings = {name: yaml.safe_load(value) for name, _, value in parts}
+    sfm = SfmConfig.model_validate({**config.groundtruth.sfm.model_dump(), **settings})
+    groundtruth = config.groundtruth.model_copy(update={"sfm": sfm})
+    return config.model_copy(update={"groundtruth": groundtruth})
+
+
 def measured(trajectory: BatchTrajectory, truth: Any, config: Config) -> dict[str, Any]:
     """Compute the errors of a batch that starts at its true first pose, gaps filled as in chaining.
 
@@ -121,11 +145,17 @@ def main() -> None:
     parser.add_argument("--scene", required=True)
     parser.add_argument("--method", choices=("sfm", "kinect-fusion"), required=True)
     parser.add_argument("--batches", type=int, nargs="+", required=True)
+    parser.add_argument("--set", nargs="+", default=[], metavar="NAME=VALUE", dest="settings")
+    parser.add_argument("--made", action="store_true")
     args = parser.parse_args()
     config = load_config(Path("config/config.yaml"), Path(f"config/{args.profile}.yaml"))
+    config, root = with_settings(config, args.settings), args.results / args.profile
     for index in args.batches:
-        files = frames_of(args.results / args.profile, config, args.scene, index)
-        trajectory, facts, cpu_s = estimate(args.method, config, args.scene, index, files)
+        files = frames_of(root, config, args.scene, index)
+        if args.made:
+            trajectory, facts, cpu_s = made(root, args.method, args.scene, index)
+        else:
+            trajectory, facts, cpu_s = estimate(args.method, config, args.scene, index, files)
         keys = {"scene": args.scene, "batch": index, "method": args.method, "code": args.code}
         row = {**keys, **measured(trajectory, files[2], config), "cpu_s": cpu_s}
         row |= {name: facts.get(name, "") for name in ("models", "images_with_weak_features")}
