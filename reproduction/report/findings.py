@@ -32,7 +32,7 @@ from reproduction.tables.label_error import SCHEMA as LABEL_ERROR
 from reproduction.tables.layouts import TITLES
 from reproduction.tables.references import SCHEMA as REFERENCES
 from reproduction.tables.references import two_digits
-from synfeal.records.tables import Schema, read_frame, rows_of
+from synfeal.records.tables import NUMBER, TEXT, Schema, read_frame, rows_of
 
 ROOM, SMALL, LARGE = "large_room", "6k", "80k"
 # Runs with fresh seeds that findings are told by, where they are published.
@@ -53,6 +53,12 @@ SHAPES = {
     "noise": "every frame has its own error",
     "offset": "all frames of a path share one error",
     "bend": "space is bent",
+}
+# Table of changes that were compared frame by frame.
+BY_FRAME = "shape_changes"
+BY_FRAME_SCHEMA = {
+    **dict.fromkeys(("change", "error"), TEXT),
+    **dict.fromkeys(("percent", "percent_low", "percent_high"), NUMBER),
 }
 
 
@@ -213,7 +219,13 @@ def a_map_beats_exact_labels(root: Path) -> Finding | None:
 
 
 def shape_changes(root: Path) -> dict[str, tuple[Interval, Interval]]:
-    """Compute how each shape of label errors changes both errors against the truth."""
+    """Return how each shape of label errors changes both errors against the truth.
+
+    They are compared frame by frame where ``benchmarks/shape_changes.py`` has done so, else with
+    the limits that Table 6 gives them.
+    """
+    if _has_by_frame(root):
+        return _shapes_by_frame(root)
     cells = read_table(root, "table6_label_errors")
     noise = most_noise(root)
     clean = cells[cells.labels == "synfeal"]
@@ -226,6 +238,22 @@ def shape_changes(root: Path) -> dict[str, tuple[Interval, Interval]]:
     }
     paired = paired_changes(root, "C5", "both")
     return changes | ({"noise": paired} if paired and "noise" in changes else {})
+
+
+def _has_by_frame(root: Path) -> bool:
+    return (root / "tables" / f"{BY_FRAME}.csv").is_file()
+
+
+def _shapes_by_frame(root: Path) -> dict[str, tuple[Interval, Interval]]:
+    """Read changes that were compared frame by frame, as factors."""
+    rows = rows_of(read_table(root, BY_FRAME, BY_FRAME_SCHEMA))
+    factors = {
+        (row.change, row.error): Interval(
+            *(1 + percent / 100 for percent in (row.percent, row.percent_low, row.percent_high))
+        )
+        for row in rows
+    }
+    return {shape: (factors[shape, "position"], factors[shape, "orientation"]) for shape in SHAPES}
 
 
 def shared_errors_stay(root: Path) -> Finding | None:
@@ -249,7 +277,7 @@ def shared_errors_stay(root: Path) -> Finding | None:
         f"Labels that are {_noise(moved_by(root))} off change the orientation error, averaged over"
         f" the five networks, by {', '.join(parts[:-1])}, and {parts[-1]}.",
         "the truth",
-        "table6_label_errors",
+        BY_FRAME if _has_by_frame(root) else "table6_label_errors",
         _told_by(root, asked),
     )
 
