@@ -79,7 +79,7 @@ def draw(trace: pd.DataFrame, names: list[str], title: str) -> Figure:
     seen.plot(trace.frame, trace.features, label="usual contrast")
     seen.plot(trace.frame, trace.features_in_the_end, "--", label="with weak ones")
     seen.set_yscale("symlog", linthresh=10)
-    seen.set_ylim(bottom=0)
+    seen.set_ylim(0, 2 * trace.features_in_the_end.max())
     seen.set_ylabel("features")
     seen.legend(loc="lower left")
     for name in names:
@@ -87,7 +87,7 @@ def draw(trace: pd.DataFrame, names: list[str], title: str) -> Figure:
     off.set_yscale("symlog", linthresh=1)
     off.set_ylim(bottom=0)
     off.set_ylabel("position error (cm)")
-    off.legend(loc="upper left")
+    off.legend(loc="lower right", ncols=len(names))
     for row, name in enumerate(names):
         there = trace[f"registered_{name}"].to_numpy() == 1
         found.fill_between(trace.frame, row + 0.1, row + 0.9, where=there, step="mid")
