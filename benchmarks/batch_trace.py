@@ -1,4 +1,4 @@
-"""Where an estimated batch goes wrong: a picture of what there was to see, and of the errors.
+"""Draw where an estimated batch goes wrong: what there was to see, and the errors.
 
     python -m benchmarks.batch_trace results/benchmarks/sfm_trace --scene large_room --batch 18 \
         --trajectory before=before.csv --trajectory after=after.csv
@@ -20,12 +20,10 @@ import pycolmap
 from matplotlib.figure import Figure
 
 from baselines.labels.batches import link_images, read_trajectory
-from baselines.labels.chain import fill_gaps
 from baselines.labels.sfm.features import extract_features
-from benchmarks.label_batches import Files, frames_of
+from benchmarks.label_batches import Files, errors_of, frames_of
 from reproduction.config.load import load_config
 from reproduction.config.profile import Config
-from synfeal.geometry.poses import pose_error, relative
 from synfeal.mesh.clearance import cut_to_size, point_triangle_distances
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.records.tables import write_frame
@@ -125,8 +123,7 @@ def main() -> None:
         names.append(name)
         trajectory = read_trajectory(Path(path))
         columns[f"registered_{name}"] = trajectory.registered.astype(int)
-        true = relative(world_from_cam[0], world_from_cam)
-        columns[f"error_{name}_m"] = pose_error(fill_gaps(trajectory), true)[0]
+        columns[f"error_{name}_m"] = errors_of(trajectory, world_from_cam)[0]
     trace = pd.DataFrame(columns)
     write_frame(args.stem.with_suffix(".csv"), trace, "%.4g")
     draw(trace, names, f"{args.scene}, batch {args.batch}").savefig(

@@ -105,6 +105,16 @@ def with_settings(config: Config, given: Sequence[str]) -> Config:
     return config.model_copy(update={"groundtruth": groundtruth})
 
 
+def errors_of(trajectory: BatchTrajectory, truth: Any) -> tuple[Any, Any]:
+    """Return errors (N,), metres and radians, of a batch that starts at its true first pose.
+
+    Args:
+        trajectory: Estimate of the batch, whose gaps are filled as in chaining.
+        truth: True poses (N, 4, 4).
+    """
+    return pose_error(fill_gaps(trajectory), relative(truth[0], truth))
+
+
 def measured(trajectory: BatchTrajectory, truth: Any, config: Config) -> dict[str, Any]:
     """Compute the errors of a batch that starts at its true first pose, gaps filled as in chaining.
 
@@ -116,8 +126,8 @@ def measured(trajectory: BatchTrajectory, truth: Any, config: Config) -> dict[st
     Returns:
         Numbers of a row, by column.
     """
-    cfg, true = config.groundtruth, relative(truth[0], truth)
-    error_m, error_rad = pose_error(fill_gaps(trajectory), true)
+    cfg = config.groundtruth
+    error_m, error_rad = errors_of(trajectory, truth)
     error_deg = np.degrees(error_rad)
     found = trajectory.registered
     off = error_m[-1] > cfg.assist_position_m or error_deg[-1] > cfg.assist_orientation_deg

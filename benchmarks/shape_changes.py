@@ -1,12 +1,12 @@
-"""What label errors of each shape change, compared frame by frame with exact labels.
+"""Compare label errors of each shape with exact labels, frame by frame.
 
     python -m benchmarks.shape_changes results/shapes/tables/shape_changes.csv --profile shapes
 
 Table 6 has medians with limits, but not the errors of single frames, so that limits of changes
 between its rows are computed as if their frames were different ones. This reads the errors of a
 finished run and compares them on the same test frames, as the claims do: a row for each shape
-against exact labels, and one for each pair of shapes, in percentage points. The table
-is published with the run, and the third finding has its limits from there.
+against exact labels, and one for each pair of shapes, in percentage points. The table is published
+with the run, and the third finding has its limits from there.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ from reproduction.report.findings import (
     more_frames_help,
     noise_is_mostly_the_yardsticks,
     sentences,
+    shared_errors_stay,
 )
 from reproduction.report.intervals import Interval, cell_interval, mean_change
 from reproduction.report.published_claims import interval_in, rows_now, rules_note
@@ -167,6 +168,31 @@ def test_shapes_of_label_errors(told):
     assert of_space[1] > of_frames[2]
     shared_stay = of_paths[1] > of_frames[2]
     assert ("frames share do not" in finding.headline) == shared_stay
+
+
+def test_shapes_of_a_run_that_was_not_compared_frame_by_frame(tmp_path):
+    """Noise has the limits of C5, paired on the common test set, other shapes those of Table 6."""
+    root = Path(shutil.copytree(NIGHT, tmp_path / "night"))
+    cells = table("table6_label_errors", root)
+    clean = cells[cells.labels == "synfeal"]
+    worst = cells[cells.noise_m == 0.3]
+    finding = shared_errors_stay(root)
+    assert finding.table == "table6_label_errors"
+    printed = numbers(finding.evidence)[2:]
+    claims = {row["id"]: row for _, row in read_records(root / "claims.csv")}
+    # "both: p ..., o +a % to +b %".
+    both = claims["C5"]["interval_true"].split("both: ")[1]
+    measured = claims["C5"]["measured_true"].split("both: ")[1]
+    expected = [numbers(measured)[1], *numbers(both)[2:]]
+    assert printed[:3] == [round(number) for number in expected]
+    assert expected[0] == pytest.approx(
+        change(clean, worst[worst.labels == "noise"], ORIENTATION), abs=1.5
+    )
+    for place, shape in ((3, "offset"), (6, "bend")):
+        value, low, high = printed[place : place + 3]
+        rows = worst[worst.labels == shape]
+        assert value == round(change(clean, rows, ORIENTATION))
+        assert expected[2] < low < value < high
 
 
 def test_noise_and_the_yardstick(told):
@@ -352,6 +378,8 @@ def test_sentences_follow_the_results(tmp_path):
     cells.loc[bent, ends] /= 4
     cells.to_csv(path, index=False)
     assert len(findings(root)) == found - 1
+    (*_, shapes) = findings_figure.panels(root)
+    assert shapes.title.startswith("3  Label errors by their shape")
     path.unlink()
     assert not can_tell(root)
     assert can_tell(NIGHT)
