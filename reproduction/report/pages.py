@@ -58,9 +58,9 @@ REAL_PAGE, REAL = Path("docs/real.md"), "real"
 FIGURE = Path("docs/images/findings.png")
 HEADLINES = ("night", "mini")
 LIMITS_NOTE = (
-    "Brackets hold 95 % limits over test paths and training runs. Those of the changes with label"
-    " errors of each shape, with independent noise, with the size of the data set and of PoseNet2"
-    " are from errors compared frame by frame, most of them as claims are judged ([this run's"
+    "Brackets hold 95 % limits over test paths and training runs. The changes with label errors by"
+    " shape, with noise and with the size of the data set, and those of PoseNet2, have limits from"
+    " errors compared frame by frame, most of them as claims are judged ([this run's"
     " claims]({claims}), [claims with fresh seeds]({claims}-judged-with-fresh-seeds)). Limits of"
     " other changes are computed as if the two errors had been measured on different frames, which"
     " makes them wide."
