@@ -41,6 +41,11 @@ class ReferencesConfig(Strict):
         description="structure: for all label sets, or for the true poses, those of SfM and the"
         " largest noise of each block of Table 3",
     )
+    structure_sizes: Literal["labelled", "all"] = Field(
+        "labelled",
+        description="structure, adjusted, coordinates: on sizes whose labels are estimated, which"
+        " have frames with depth, or on all sizes, of which such frames are then rendered",
+    )
     max_features: Count = Field(1000, description="structure: SIFT features per image")
     contrast: Positive = Field(0.013, description="structure: least contrast (OpenCV: 0.04)")
     retrieved: Count = Field(20, description="structure: training images matched with a test image")

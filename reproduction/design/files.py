@@ -63,9 +63,20 @@ class Files:
         return sorted({(row.scene, row.size) for row in self.design.rows})
 
     @cached_property
-    def labelled_scenes(self) -> list[str]:
-        """Scenes of which some label set is estimated, so of which large frames are rendered."""
-        return sorted({scene for scene, _, _ in self.design.estimated})
+    def depth_sizes(self) -> list[tuple[str, str]]:
+        """Scenes and sizes of which large frames with depth are rendered.
+
+        Labels are estimated from them, or reference methods answer from them.
+        """
+        rows, references = self.design.rows, self.config.references
+        labelled = {(scene, size) for scene, size, _ in self.design.estimated}
+        matched = {key for key in self.sizes if has_structure(rows, *key, references)}
+        return sorted(labelled | matched)
+
+    @cached_property
+    def depth_scenes(self) -> list[str]:
+        """Scenes of which such frames are rendered."""
+        return sorted({scene for scene, _ in self.depth_sizes})
 
     @cached_property
     def tables(self) -> list[str]:
@@ -100,8 +111,8 @@ class Files:
 
         Args:
             scene: Name of the scene.
-            camera: ``network`` for frames that localizers see, ``groundtruth`` for those that
-                labels are estimated from.
+            camera: ``network`` for frames that localizers see, ``groundtruth`` for large ones with
+                depth.
             split: ``train`` or ``test``.
 
         Returns:
@@ -113,7 +124,7 @@ class Files:
             if not sizes:
                 return self.config.n_largest(scene, split)
         else:
-            sizes = {size for labelled, size, _ in self.design.estimated if labelled == scene}
+            sizes = {size for of, size in self.depth_sizes if of == scene}
         return max((self.config.n_frames(scene, size, split) for size in sizes), default=0)
 
     def sequences(self, scene: str, camera: str) -> list[Sequence]:
@@ -170,7 +181,7 @@ class Files:
 
     def manifests(self, camera: str) -> list[str]:
         """List data sets of image files."""
-        scenes = self.scenes if camera == "network" else self.labelled_scenes
+        scenes = self.scenes if camera == "network" else self.depth_scenes
         return [f"{self.root}/datasets/{scene}/{camera}/manifest.json" for scene in scenes]
 
     def light_shares(self, scene: str, effects: EffectsConfig | None) -> list[str]:
@@ -215,7 +226,7 @@ class Files:
 
     def cameras(self, scene: str) -> list[str]:
         """List cameras that frames of a scene are rendered through."""
-        return ["network", *(["groundtruth"] if scene in self.labelled_scenes else [])]
+        return ["network", *(["groundtruth"] if scene in self.depth_scenes else [])]
 
     def details(self, scene: str, kind: str) -> list[str]:
         """List levels of detail of these cameras; none where the full mesh is drawn."""
@@ -384,7 +395,7 @@ class Files:
     def has_robust_structure(self) -> bool:
         """Tell whether frames with depth are rendered of its data set."""
         robust = self.config.robustness
-        return has_structure(self.design.rows, robust.scene, robust.size)
+        return has_structure(self.design.rows, robust.scene, robust.size, self.config.references)
 
     def robust_frames(self, split: str) -> int:
         """Count frames of a split of the robustness table's data set."""

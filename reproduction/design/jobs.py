@@ -92,7 +92,7 @@ def _scenes(files: Files) -> dict[str, list[Job]]:
 def _details(files: Files, rooms: Iterable[str]) -> list[Job]:
     """List the meshes that colours are drawn of, but for cameras that draw the full one."""
     drawn = [(scene, "network") for scene in [*files.scenes, *rooms]]
-    drawn += [(scene, "groundtruth") for scene in files.labelled_scenes]
+    drawn += [(scene, "groundtruth") for scene in files.depth_scenes]
     drawn = [key for key in drawn if files.detail(*key, "glb")]
     robust = files.config.robustness.scene
     effects = [*files.tested_effects, MIXED] if files.has_robustness else []
@@ -109,10 +109,10 @@ def _frames(files: Files) -> dict[str, list[Job]]:
     return {
         "render": [
             {"scene": scene, "camera": camera, "sequence": sequence.name}
-            for scene in files.labelled_scenes
+            for scene in files.depth_scenes
             for sequence in files.sequences(scene, camera)
         ],
-        "dataset": [{"scene": scene, "camera": camera} for scene in files.labelled_scenes],
+        "dataset": [{"scene": scene, "camera": camera} for scene in files.depth_scenes],
         "render_packed": [
             {"scene": scene, "sequence": sequence.name}
             for scene, split in packed

@@ -19,15 +19,21 @@ def data_sets(rows: Iterable[Experiment]) -> list[DataSet]:
     return sorted({(row.scene, row.size, row.label_id) for row in rows})
 
 
-def has_structure(rows: Iterable[Experiment], scene: str, size: str) -> bool:
-    """Tell whether frames with depth are rendered of a size, to estimate labels from.
+def has_structure(
+    rows: Iterable[Experiment], scene: str, size: str, references: ReferencesConfig
+) -> bool:
+    """Tell whether methods that need frames with depth answer for a size.
 
     Args:
         rows: Rows of the design.
         scene: Name of the scene.
         size: Name of the size.
+        references: Groups of methods that are asked, and the sizes that they answer for.
     """
-    return any((r.scene, r.size) == (scene, size) and r.labels in METHODS for r in rows)
+    own = [row for row in rows if (row.scene, row.size) == (scene, size)]
+    if references.structure_sizes == "all" and not {"images"}.issuperset(references.groups):
+        return bool(own)
+    return any(row.labels in METHODS for row in own)
 
 
 def answered_by(
@@ -45,7 +51,7 @@ def answered_by(
     """
     rows, (scene, size, labels) = list(rows), data_set
     groups: set[Group] = {"images"}
-    if has_structure(rows, scene, size):
+    if has_structure(rows, scene, size, references):
         same = [row for row in rows if (row.scene, row.size) == (scene, size)]
         papers = [row for row in same if row.table in PAPERS]
         few = worst(papers)

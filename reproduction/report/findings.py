@@ -36,7 +36,7 @@ from synfeal.records.tables import NUMBER, TEXT, Schema, read_frame, rows_of
 
 ROOM, SMALL, LARGE = "large_room", "6k", "80k"
 # Runs with fresh seeds that findings are told by, where they are published.
-LABELS, CONTROLS, DOSE, ERROR_SHAPES = "labels", "controls", "dose", "shapes"
+LABELS, CONTROLS, DOSE, ERROR_SHAPES, MAPS = "labels", "controls", "dose", "shapes", "maps"
 MEASURES = ("position_m", "orientation_deg")
 POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
 # What feature matching does without depth: points are where rays of two training frames meet.
@@ -175,6 +175,7 @@ def best(cells: pd.DataFrame) -> Any:
 
 def structure_beats_regression(root: Path) -> Finding | None:
     """Compare feature matching and regression on identical frames with exact labels."""
+    asked, root = root, fresh_run(root, MAPS)
     matched, network = reference(root, WITHOUT_DEPTH), best(localizers(root))
     if matched is None:
         return None
@@ -192,11 +193,13 @@ def structure_beats_regression(root: Path) -> Finding | None:
         f" {_deg(angles[1])}.",
         "labels and truth alike, because these labels are exact",
         "references",
+        _told_by(root, asked),
     )
 
 
 def a_map_beats_exact_labels(root: Path) -> Finding | None:
     """Compare a bundle-adjusted map from noisy labels with regression on exact ones."""
+    asked, root = root, fresh_run(root, MAPS)
     noise = most_noise(root)
     adjusted, network = reference(root, ADJUSTED, noise), best(localizers(root))
     if adjusted is None:
@@ -215,6 +218,7 @@ def a_map_beats_exact_labels(root: Path) -> Finding | None:
         f" {_cm(theirs[0])} and {_deg(theirs[1])}.",
         "the truth",
         "references",
+        _told_by(root, asked),
     )
 
 

@@ -19,6 +19,7 @@ from reproduction.figures.style import BLUE, GREEN, RC, VERMILION
 from reproduction.report.findings import (
     ADJUSTED,
     ERROR_SHAPES,
+    MAPS,
     POSITION,
     SHAPES,
     WITHOUT_DEPTH,
@@ -66,12 +67,16 @@ def panels(root: Path) -> list[Panel]:
 
     A panel that lacks a row, a value or a limit is left out.
     """
-    noise, off = most_noise(root), _off(root)
-    by_shape = fresh_run(root, ERROR_SHAPES)
-    clean, noisy = best(localizers(root)), best(localizers(root, noise))
+    mapped, by_shape = fresh_run(root, MAPS), fresh_run(root, ERROR_SHAPES)
+    noise, off = most_noise(mapped), _off(mapped)
+    clean, noisy = best(localizers(mapped)), best(localizers(mapped, noise))
     found = {
-        "feature map, exact labels": (reference(root, WITHOUT_DEPTH), BOTH, BLUE),
-        f"adjusted feature map, labels {off} off": (reference(root, ADJUSTED, noise), TRUTH, GREEN),
+        "feature map, exact labels": (reference(mapped, WITHOUT_DEPTH), BOTH, BLUE),
+        f"adjusted feature map, labels {off} off": (
+            reference(mapped, ADJUSTED, noise),
+            TRUTH,
+            GREEN,
+        ),
         f"best network ({TITLES[clean.model]}), exact labels": (clean, BOTH, VERMILION),
         f"best network ({TITLES[noisy.model]}), labels {off} off": (noisy, TRUTH, VERMILION),
     }

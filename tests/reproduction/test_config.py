@@ -168,8 +168,8 @@ def test_controls_show_small_sets_as_many_images_and_large_ones_every_frame_twic
 
 
 def test_no_two_fresh_runs_share_a_seed():
-    # The last two are for no claim.
-    names = [*(run.profile for run in RUNS), "shapes", "sanctuary_labels"]
+    # The last three are for no claim.
+    names = [*(run.profile for run in RUNS), "shapes", "maps", "sanctuary_labels"]
     seeds = [load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml").seed for name in names]
     assert len({*seeds, 0}) == len(seeds) + 1
 

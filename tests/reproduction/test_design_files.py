@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import pytest
 
+from baselines.config.references import ReferencesConfig
 from reproduction.config.load import load_config
 from reproduction.design.experiments import read_design
 from reproduction.design.files import Files
@@ -48,6 +49,25 @@ def test_an_estimated_row_adds_its_batches_and_large_frames():
     assert {job["camera"] for job in jobs["render"]} == {"groundtruth"}
     assert "rgbd" not in jobs
     assert len(jobs["train"]) == 10
+
+
+def test_structure_on_all_sizes_needs_large_frames_and_no_estimated_labels():
+    asked = {"groups": ["images", "structure"], "structure_sizes": "all"}
+    rows = (ROW, {**ROW, "size": "20k"})
+    files = files_of(*rows, references=ReferencesConfig(**asked))
+    jobs = jobs_of_run(files)
+    assert not {"sfm", "rgbd", "chain"} & set(jobs)
+    # Those of the larger size, of which the smaller one has the first.
+    assert files.n_frames("large_room", "groundtruth", "train") == 200
+    drawn = [files.sequence("large_room", "groundtruth", job["sequence"]) for job in jobs["render"]]
+    assert sum(len(sequence) for sequence in drawn if sequence.split == "train") == 200
+    assert {(job["size"], job["split"]) for job in jobs["features"]} == {
+        (size, split) for size in ("6k", "20k") for split in ("train", "test")
+    }
+    assert {job["size"] for job in jobs["structure_references"]} == {"6k", "20k"}
+    # Retrieval needs no depth, wherever it is asked for.
+    retrieval = ReferencesConfig(**{**asked, "groups": ["images"]})
+    assert files_of(*rows, references=retrieval).depth_scenes == []
 
 
 @pytest.mark.parametrize(("sizes", "frames"), [(["6k"], 60), (["6k", "40k"], 400), (["20k"], 200)])

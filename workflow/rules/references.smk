@@ -56,7 +56,7 @@ rule features:
     params:
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
         camera=dump(CONFIG.groundtruth_camera),
-        references=dump(CONFIG.references, exclude={"coordinate_samples"}),
+        references=dump(CONFIG.references, include={"max_features", "contrast"}),
     script:
         "../scripts/run_features.py"
 

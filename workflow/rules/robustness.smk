@@ -133,7 +133,9 @@ rule varied_structure:
         sample=CONFIG.robustness.structure_frames,
         camera=dump(CONFIG.groundtruth_camera),
         render=lambda w: dump(FILES.varied_render(w.effects)),
-        references=dump(CONFIG.references, exclude={"coordinate_samples"}),
+        references=dump(
+            CONFIG.references, include={"max_features", "contrast", "retrieved"}
+        ),
         seed=seed_of(CONFIG.seed, "references", *FILES.robust_set.split("/")),
     script:
         "../scripts/run_varied_structure.py"
