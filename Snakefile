@@ -67,6 +67,7 @@ EVIDENCE = [
     "recall",
     "references_table",
     "label_ranking",
+    "shape_changes",
     "speed_vs_error",
     "hard_cases",
     "document",

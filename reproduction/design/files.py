@@ -18,6 +18,8 @@ from reproduction.config.profile import Config
 from reproduction.design.experiments import Design, Run, common_every, split_init
 from reproduction.design.ranking import ranked_sets, rankings
 from reproduction.design.references import DataSet, answered_by, data_sets, has_structure
+from reproduction.design.shapes import TABLE as SHAPE_TABLE
+from reproduction.design.shapes import shape_rows
 from synfeal.config.dataset import RenderConfig
 from synfeal.config.effects import CLEAN, MIXED, EffectsConfig
 from synfeal.dataset.frame_files import SUFFIX
@@ -97,6 +99,11 @@ class Files:
     def ranking_tables(self) -> tuple[str, ...]:
         """The table of how labels rank methods; none where all labels are exact."""
         return ("label_ranking",) if ranked_sets(self.design) else ()
+
+    @cached_property
+    def shape_tables(self) -> tuple[str, ...]:
+        """The table that compares label errors by their shape; none where rows are missing."""
+        return ("shape_changes",) if shape_rows(self.design.rows) else ()
 
     @cached_property
     def backbones(self) -> list[str]:
@@ -355,6 +362,11 @@ class Files:
         sets = ranked_sets(self.design)
         named = {"/".join(key) for key in sets} | {f"{s}/{size}/synfeal" for s, size, _ in sets}
         return [f"{self.root}/labels/{name}/test.csv" for name in sorted(named)]
+
+    def compared_errors(self) -> list[str]:
+        """List errors on the common test frames that tell label errors apart by their shape."""
+        runs = self.runs_of(SHAPE_TABLE) if self.shape_tables else []
+        return [f"{self.root}/runs/{run}/common_errors.csv" for run in runs]
 
     # Robustness: test frames with effects
 

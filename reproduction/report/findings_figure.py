@@ -15,19 +15,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
+from reproduction.design.shapes import SHAPES
 from reproduction.figures.style import BLUE, GREEN, RC, VERMILION
 from reproduction.report.findings import (
     ADJUSTED,
     ERROR_SHAPES,
     MAPS,
     POSITION,
-    SHAPES,
     WITHOUT_DEPTH,
     best,
     fresh_run,
     localizers,
     most_noise,
     moved_by,
+    off_in_all_shapes,
     reference,
     shape_changes,
     shared_errors_stay,
@@ -68,7 +69,7 @@ def panels(root: Path) -> list[Panel]:
     A panel that lacks a row, a value or a limit is left out.
     """
     mapped, by_shape = fresh_run(root, MAPS), fresh_run(root, ERROR_SHAPES)
-    noise, off = most_noise(mapped), _off(mapped)
+    noise, off = most_noise(mapped), _said(moved_by(mapped))
     clean, noisy = best(localizers(mapped)), best(localizers(mapped, noise))
     found = {
         "feature map, exact labels": (reference(mapped, WITHOUT_DEPTH), BOTH, BLUE),
@@ -104,7 +105,7 @@ def panels(root: Path) -> list[Panel]:
     if len(changes) == len(SHAPES) and _are_finite(changes):
         drawn.append(
             Panel(
-                _title_of_shapes(root, _off(by_shape)),
+                _title_of_shapes(root, _said(off_in_all_shapes(by_shape))),
                 changes,
                 "change of the networks' orientation error, %, mean over five"
                 " (0: labels do no harm)",
@@ -123,10 +124,9 @@ def _title_of_shapes(root: Path, off: str) -> str:
     )
 
 
-def _off(root: Path) -> str:
-    """Say how far off the labels with the most noise are."""
-    moved_m, turned_deg = moved_by(root)
-    return f"{100 * moved_m:.0f} cm, {turned_deg:.0f}°"
+def _said(off: tuple[float, float]) -> str:
+    """Say how far off labels are, given in metres and degrees."""
+    return f"{100 * off[0]:.0f} cm, {off[1]:.0f}°"
 
 
 def _are_finite(rows: Sequence[Row]) -> bool:

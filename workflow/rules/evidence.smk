@@ -88,6 +88,26 @@ rule label_ranking:
         "../scripts/run_label_ranking.py"
 
 
+rule shape_changes:
+    input:
+        errors=FILES.compared_errors(),
+        labels=under("labels/{set}/{split}.csv", set=FILES.true_sets, split=SPLITS),
+    output:
+        **table_files("shape_changes"),
+    log:
+        f"{ROOT}/logs/tables/shape_changes.log",
+    benchmark:
+        f"{ROOT}/benchmarks/tables/shape_changes.tsv"
+    conda:
+        "../envs/synfeal.yaml"
+    resources:
+        mem_mb=grown(1000),
+    params:
+        design=dump(DESIGN),
+    script:
+        "../scripts/run_shape_changes.py"
+
+
 rule recall:
     input:
         metrics=FILES.of_runs("metrics.json"),
@@ -198,7 +218,7 @@ rule document:
     input:
         tables=[
             *under("tables/{t}.tex", t=[*FILES.tables, "references", "recall"]),
-            *under("tables/{t}.tex", t=FILES.ranking_tables),
+            *under("tables/{t}.tex", t=[*FILES.ranking_tables, *FILES.shape_tables]),
             *FILES.robustness_tables("tex"),
         ],
     output:
@@ -300,7 +320,7 @@ RESULTS = [
     *under("tables/{table}.csv", table=FILES.label_tables),
     rules.references_table.output.csv,
     rules.recall.output.csv,
-    *under("tables/{table}.csv", table=FILES.ranking_tables),
+    *under("tables/{table}.csv", table=[*FILES.ranking_tables, *FILES.shape_tables]),
     *FILES.robustness_tables(),
     rules.figures.output.dir,
     rules.summary.output.md,

@@ -15,10 +15,12 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from PIL import Image
 
+from reproduction.claims import label_shapes
 from reproduction.claims.verdicts import Verdict
 from reproduction.config.tables import KEYS
 from reproduction.design.experiments import Design, Experiment
 from reproduction.design.ranking import ranked_sets
+from reproduction.design.shapes import shape_rows
 from reproduction.figures.registry import CAPTIONS
 from reproduction.hard_cases import table as hard_cases
 from reproduction.report.findings import can_tell, findings
@@ -99,6 +101,7 @@ SIDE_TABLES: Sequence[Any] = (
     assistance,
     label_error,
     label_ranking,
+    label_shapes,
     speed_vs_error,
     hard_cases,
 )
@@ -178,10 +181,12 @@ def opening(root: Path) -> str:
 def rowless_tables(design: Design, with_robustness: bool) -> list[str]:
     """List side tables for which a design has no rows.
 
-    Those of estimated labels, of what inexact labels rank, and of frames with effects.
+    Those of estimated labels, of what inexact labels rank, of label errors by their shape, and of
+    frames with effects.
     """
     of_labels = [] if design.estimated else [assistance.NAME, label_error.NAME]
     of_labels += [] if ranked_sets(design) else [label_ranking.NAME]
+    of_labels += [] if shape_rows(design.rows) else [label_shapes.NAME]
     return [*of_labels, *([] if with_robustness else [robustness.NAME])]
 
 
