@@ -16,7 +16,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from reproduction.claims.rules import frozen_rules
-from reproduction.claims.verdicts import Claim, Verdict, published_claims
+from reproduction.claims.verdicts import MEANINGS, Claim, Verdict, published_claims
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rules_of
 from reproduction.runs.results import read_result
@@ -36,6 +36,8 @@ BESIDE = re.compile("; (?:sign tests|tau)")
 # Verdicts that say more than *smaller than published*: where one run gives one of them and another
 # run that, they agree.
 BELOW_PUBLISHED = (Verdict.SMALLER, Verdict.NEGLIGIBLE, Verdict.OPPOSITE)
+NONE_YET = "No claim has been judged with fresh seeds yet."
+CONTRADICTED = "runs contradict each other"
 # Verdicts that leave a claim open.
 OPEN = (Verdict.UNDECIDED, Verdict.NOT_TESTABLE, Verdict.NOT_LEARNT)
 
@@ -91,8 +93,8 @@ class Judged(NamedTuple):
         return self.row["verdict_true"] not in OPEN
 
 
-def is_decided(judged: Sequence[Judged]) -> bool:
-    """Tell whether runs decide a claim: one does, and none decides it otherwise.
+def decided_verdicts(judged: Sequence[Judged]) -> set[str]:
+    """Return what runs decide on a claim against the truth; several verdicts contradict each other.
 
     *Smaller than published* leaves open how much smaller, so that a verdict below the published
     effect bears it out (``BELOW_PUBLISHED``).
@@ -103,7 +105,12 @@ def is_decided(judged: Sequence[Judged]) -> bool:
     found = {own.row["verdict_true"] for own in judged if own.decided}
     if not found.isdisjoint(BELOW_PUBLISHED):
         found.discard(Verdict.LESS)
-    return len(found) == 1
+    return found
+
+
+def is_decided(judged: Sequence[Judged]) -> bool:
+    """Tell whether runs decide a claim: one does, and none decides it otherwise."""
+    return len(decided_verdicts(judged)) == 1
 
 
 def claims_to_test() -> list[Claim]:
@@ -163,23 +170,69 @@ def fresh_claims(published: Path = PUBLISHED) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def fresh_sentence(published: Path = PUBLISHED) -> str:
-    """Say how many claims were judged with fresh seeds, and how they fared."""
-    judged, asked = judged_fresh(published), claims_to_test()
+def fresh_answer(published: Path = PUBLISHED) -> str:
+    """List the claims by what fresh seeds say about them against the truth, in plain words."""
+    judged = judged_fresh(published)
     if not judged:
-        return "No claim has been judged with fresh seeds yet."
+        return NONE_YET
+    titles = {str(verdict): f"**{verdict}** ({text})" for verdict, text in MEANINGS.items()}
+    groups: dict[str, list[str]] = {name: [] for name in (*titles, CONTRADICTED)}
+    for own in judged.values():
+        groups[_outcome(own)].append(f"    - {own[0].claim.statement} ({_runs_behind(own)})")
+    lines = [
+        line
+        for name, claims in groups.items()
+        if claims
+        for line in (f"- {titles.get(name, f'**{name}**')}:", *claims)
+    ]
+    return "\n".join(
+        [f"{_counts(judged)} Judged by the errors against the true poses:", "", *lines]
+    )
+
+
+def _outcome(judged: Sequence[Judged]) -> str:
+    """Return the verdict that runs come to on one claim, or that they contradict each other."""
+    decided = decided_verdicts(judged)
+    if len(decided) > 1:
+        return CONTRADICTED
+    return str(*(decided or {judged[0].row["verdict_true"]}))
+
+
+def _runs_behind(judged: Sequence[Judged]) -> str:
+    """Name a claim and its runs; of several that decide and leave open, both."""
+    runs: dict[bool, list[str]] = {True: [], False: []}
+    for own in judged:
+        runs[own.decided].append(f"`{own.profile}`")
+    parts = [", ".join(runs[True] or runs[False])]
+    if runs[True] and runs[False]:
+        parts.append(f"open in {', '.join(runs[False])}")
+    return f"{judged[0].claim.id}: {'; '.join(parts)}"
+
+
+def _counts(judged: Mapping[str, Sequence[Judged]]) -> str:
+    """Say how many claims were judged with fresh seeds, and how many of them are decided."""
+    decided = sum(map(is_decided, judged.values()))
+    return (
+        f"**With fresh seeds**, by rules that were frozen before, {len(judged)} of the"
+        f" {len(claims_to_test())} claims about localization and labels have been judged so far,"
+        f" and {decided} of them decided."
+    )
+
+
+def fresh_sentence(published: Path = PUBLISHED) -> str:
+    """Say how many claims were judged with fresh seeds, and name the verdicts."""
+    judged = judged_fresh(published)
+    if not judged:
+        return NONE_YET
     several = any(len(own) > 1 for own in judged.values())
     verdicts = [f"{name} {_verdicts(own)}" for name, own in judged.items()]
-    decided = sum(map(is_decided, judged.values()))
     rule = (
         " A claim that several runs judge has the verdicts of all; it counts as decided if one"
         " decides it and none decides it otherwise."
     )
     return (
-        f"**With fresh seeds**, by rules that were frozen before, {len(judged)} of the"
-        f" {len(asked)} claims about localization and labels have been judged so far, and"
-        f" {decided} of them decided: {', '.join(verdicts)}. (Two verdicts are against the labels /"
-        f" against the true poses.){rule if several else ''}"
+        f"{_counts(judged)} The verdicts: {', '.join(verdicts)}. (Two verdicts are against the"
+        f" labels / against the true poses.){rule if several else ''}"
     )
 
 

@@ -31,10 +31,10 @@ from reproduction.report.findings import (
     verdict_sentence,
 )
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
-from reproduction.report.fresh import fresh_claims, fresh_sentence
+from reproduction.report.fresh import fresh_answer, fresh_claims
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
-from reproduction.report.realisations import realisations_table
+from reproduction.report.realisations import PAPER_FRAMES, realisations_table
 from reproduction.runs.results import read_result
 from reproduction.tables.assistance import SCHEMA as ASSISTANCE
 from reproduction.tables.assistance import TOTAL
@@ -65,7 +65,6 @@ LIMITS_NOTE = (
     " other changes are computed as if the two errors had been measured on different frames, which"
     " makes them wide."
 )
-PAPER_FRAMES = {"6k": 6000}
 NOISE_HEADINGS = {
     "published": "published",
     "labels": "against the labels",
@@ -102,7 +101,7 @@ def origin(root: Path) -> str:
     record = read_result(root / "provenance.json", ("commit", "machine", "stages"), "publish again")
     cells = read_table(root, "table4_size")
     first, seeds = cells.iloc[0], sorted(set(cells.n_seeds))
-    share = PAPER_FRAMES[first["size"]] / first.n_train
+    share = PAPER_FRAMES / first.n_train  # the first row is of the smallest set
     frames = "the paper's frames" if share == 1 else f"1/{share:.3g} of the paper's frames"
     span = " to ".join(map(str, dict.fromkeys((seeds[0], seeds[-1]))))
     runs = f"{span} training run{'' if span == '1' else 's'} per cell"
@@ -195,7 +194,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     # Of all published runs together, whatever profile the mark names.
     "fresh": lambda root: fresh_claims(root.parent),
     "realisations": lambda root: realisations_table(root.parent),
-    "tested": lambda root: fresh_sentence(root.parent),
+    "tested": lambda root: fresh_answer(root.parent),
     "difficulty": lambda root: difficulty(),
     "real": real_findings,
     "real_headline": real_headline,

@@ -22,8 +22,8 @@ from synfeal.records.tables import rows_of
 
 # C2 compares PoseNet2 on these labels with PoseNet2 on exact ones.
 CLAIM, METHOD, MODEL, SCENE = "C2", "sfm", "posenet2", "large_room"
-# Frames of the paper's set; smaller profiles have wider gaps between frames.
-FRAMES = 6000
+# Training frames of the paper's smallest set; smaller profiles have wider gaps between frames.
+PAPER_FRAMES = 6000
 
 
 class Realisation(NamedTuple):
@@ -63,7 +63,7 @@ def realisations(published: Path) -> list[Realisation]:
 def _of_run(root: Path, changes: tuple[Interval, Interval]) -> list[Realisation]:
     """Describe the labels of a run; nothing where they are not of the paper's frames."""
     errors = read_table(root, "label_error", LABEL_ERROR)
-    own = (errors.scene == SCENE) & (errors.method == METHOD) & (errors.frames == FRAMES)
+    own = (errors.scene == SCENE) & (errors.method == METHOD) & (errors.frames == PAPER_FRAMES)
     labels = errors[own & (errors.split == "train") & (errors.assistance == "after")]
     cells = read_table(root, "table2_ground_truth")
     (trained,) = rows_of(cells[(cells.labels == METHOD) & (cells.model == MODEL)])
