@@ -565,7 +565,7 @@ FINDINGS: Sequence[Callable[[Path], Finding | None]] = (
 
 
 def sentences(root: Path, link: str = "") -> list[str]:
-    """List findings and verdict counts as Markdown, one item each.
+    """List findings as Markdown, one item each.
 
     Args:
         root: Published results.
@@ -578,7 +578,7 @@ def sentences(root: Path, link: str = "") -> list[str]:
         seeds = f", with fresh seeds (profile `{found.run}`)" if found.run else ""
         measured = f"*Measured against {found.against}{seeds}.*"
         items.append(f"**{found.headline}** {found.evidence} {measured}{where}")
-    return [*items, verdict_sentence(root)]
+    return items
 
 
 def verdict_sentence(root: Path) -> str:

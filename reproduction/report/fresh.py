@@ -9,6 +9,7 @@ claim the run that would decide it, with the processor time that is planned for 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from reproduction.claims.rules import frozen_rules
-from reproduction.claims.verdicts import MEANINGS, Claim, Verdict, published_claims
+from reproduction.claims.verdicts import GROUPS, MEANINGS, Claim, Verdict, published_claims
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rules_of
 from reproduction.runs.results import read_result
@@ -165,7 +166,7 @@ def fresh_claims(published: Path = PUBLISHED) -> str:
         for own in judged.values()
         for found in own
     ]
-    parts = [fresh_sentence(published), markdown_table(pd.DataFrame(rows)) if rows else ""]
+    parts = [_opening(judged), markdown_table(pd.DataFrame(rows)) if rows else ""]
     parts += [_runs(published, judged), _open(judged)]
     return "\n\n".join(part for part in parts if part)
 
@@ -210,40 +211,34 @@ def _runs_behind(judged: Sequence[Judged]) -> str:
 
 
 def _counts(judged: Mapping[str, Sequence[Judged]]) -> str:
-    """Say how many claims were judged with fresh seeds, and how many of them are decided."""
+    """Say how many claims were judged with fresh seeds, and how they fared, group by group."""
     decided = sum(map(is_decided, judged.values()))
+    groups = []
+    for group, title in GROUPS.items():
+        counts = Counter(_outcome(own) for own in judged.values() if own[0].claim.group == group)
+        if counts:
+            found = ", ".join(f"{number} {name}" for name, number in counts.most_common())
+            groups.append(f"*{title}* {found}")
     return (
         f"**With fresh seeds**, by rules that were frozen before, {len(judged)} of the"
         f" {len(claims_to_test())} claims about localization and labels have been judged so far,"
-        f" and {decided} of them decided."
+        f" and {decided} of them decided: {'; '.join(groups)}."
     )
 
 
-def fresh_sentence(published: Path = PUBLISHED) -> str:
-    """Say how many claims were judged with fresh seeds, and name the verdicts."""
-    judged = judged_fresh(published)
+def _opening(judged: Mapping[str, Sequence[Judged]]) -> str:
+    """Say how the claims fared, and how to read a table with the verdicts of all runs."""
     if not judged:
         return NONE_YET
-    several = any(len(own) > 1 for own in judged.values())
-    verdicts = [f"{name} {_verdicts(own)}" for name, own in judged.items()]
     rule = (
         " A claim that several runs judge has the verdicts of all; it counts as decided if one"
         " decides it and none decides it otherwise."
     )
+    several = any(len(own) > 1 for own in judged.values())
     return (
-        f"{_counts(judged)} The verdicts: {', '.join(verdicts)}. (Two verdicts are against the"
-        f" labels / against the true poses.){rule if several else ''}"
+        f"{_counts(judged)} Counted are verdicts against the true poses. Where the table has two"
+        f" verdicts, the first is against the labels.{rule if several else ''}"
     )
-
-
-def _verdicts(judged: Sequence[Judged]) -> str:
-    """Name the verdicts on one claim, and the runs where there are several."""
-    if len(judged) == 1:
-        return judged[0].verdict
-    runs: dict[str, list[str]] = {}
-    for own in judged:
-        runs.setdefault(own.verdict, []).append(f"`{own.profile}`")
-    return " and ".join(f"{verdict} ({', '.join(names)})" for verdict, names in runs.items())
 
 
 def _runs(published: Path, judged: Mapping[str, Sequence[Judged]]) -> str:

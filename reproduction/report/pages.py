@@ -91,9 +91,9 @@ def findings(root: Path, top: str = "", claims_page: str = "docs/results.md") ->
     """
     if not can_tell(root):
         return verdict_sentence(root)
-    *found, verdicts = sentences(root, f"{top}{root.as_posix()}")
+    found = sentences(root, f"{top}{root.as_posix()}")
     items = "\n".join(f"{n}. {text}" for n, text in enumerate(found, start=1))
-    return f"{items}\n\n{verdicts}\n\n{LIMITS_NOTE.format(claims=f'{claims_page}#claims')}"
+    return f"{items}\n\n{LIMITS_NOTE.format(claims=f'{claims_page}#claims')}"
 
 
 def origin(root: Path) -> str:
@@ -171,9 +171,10 @@ def assistance(root: Path) -> str:
 
 
 def claims(root: Path) -> str:
-    """List every claim with its verdict under both scores, and the rules they were made by."""
+    """Count verdicts, and list them under both scores, with the rules they were made by."""
     rows = read_published(root)
-    return f"{rules_note(rows, root)}\n\n{claims_markdown(rows_now(rows, root)).rstrip()}"
+    listed = claims_markdown(rows_now(rows, root)).rstrip()
+    return f"{verdict_sentence(root)} {rules_note(rows, root)}\n\n{listed}"
 
 
 def difficulty(folder: Path = RESULTS / "benchmarks" / "scene_difficulty") -> str:
