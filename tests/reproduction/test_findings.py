@@ -21,6 +21,7 @@ from reproduction.report.findings import (
     sentences,
     shared_errors_stay,
     verdict_sentence,
+    where_labels_fail,
 )
 from reproduction.report.intervals import Interval, cell_interval, mean_change
 from reproduction.report.published_claims import interval_in, rows_now, rules_note
@@ -321,12 +322,38 @@ def test_labels_of_estimators(told):
     expected += [round(100 * exact_rows[POSITION].min()), round(100 * exact_rows[POSITION].max())]
     expected += [round(n) for n in changes]
     expected += [lower, 10]
+    text, failing = text.split(" In `better_labels`")
     found = numbers(text)
     assert found[: len(expected)] == expected
     # Halves of a percent may be rounded either way.
-    judged = [p, *limits[:2], o, *limits[2:]]
-    assert found[len(expected) : -2] == pytest.approx(judged, abs=0.501)
+    ends = [p, *limits[:2], o, *limits[2:]]
+    assert found[len(expected) : -2] == pytest.approx(ends, abs=0.501)
     assert found[-2:] == [-55, -60]  # 0.14 / 0.31 and 6.70 / 16.57 in Table 2 of the paper
+    other = NIGHT.with_name("better_labels")
+    (batches,) = (
+        table("assistance", other).query("method == 'sfm' and split == 'train'").to_dict("records")
+    )
+    labels = table("label_error", other).query("split == 'train' and assistance == 'after'")
+    (labels,) = labels[labels.method == "sfm"].to_dict("records")
+    expected = [round(100 * labels["position_m_median"], 1), batches["assisted"]]
+    expected += [batches["batches"], round(100 * labels["position_m_rmse"])]
+    found = numbers(failing)
+    assert found[:4] == expected
+    judged_there = judged(other, "C2")
+    assert found[4:] == pytest.approx(judged_there, abs=0.501)
+    assert judged_there[2] < 0  # certainly lower
+    assert "only where SfM fails badly in places" in finding.headline
+
+
+def test_labels_that_fail_nowhere_leave_the_difference_too_small_to_see(tmp_path):
+    root = Path(shutil.copytree(NIGHT.with_name("better_labels"), tmp_path / "better_labels"))
+    assert "2 of 24 training batches needed assistance" in where_labels_fail(root)
+    path = root / "tables/assistance.csv"
+    batches = pd.read_csv(path)
+    batches.assign(assisted=0).to_csv(path, index=False)
+    assert where_labels_fail(root) == ""
+    assert where_labels_fail(NIGHT.with_name("labels")) == ""  # its limits reach across 0
+    assert where_labels_fail(NIGHT.with_name("tracking")) == ""  # has not judged it
 
 
 @pytest.mark.parametrize(
