@@ -526,8 +526,8 @@ def where_labels_fail(root: Path) -> str:
     return (
         f" In `{root.name}`, where SfM's labels are off by {100 * labels.position_m_median:.1f} cm"
         f" in the median, too, but {batches.assisted} of {batches.batches} training batches needed"
-        f" assistance (root mean square {100 * labels.position_m_rmse:.0f} cm), exact labels change the"
-        f" errors of PoseNet2 by {percent(changes[0])} and {percent(changes[1])}."
+        f" assistance (root mean square {100 * labels.position_m_rmse:.0f} cm), exact labels change"
+        f" the errors of PoseNet2 by {percent(changes[0])} and {percent(changes[1])}."
     )
 
 
