@@ -91,7 +91,8 @@ def with_limits(row, measure):
     One run borrows its deviation. Limits of three in old tables are made of the normal
     distribution; they are due Student's t with two degrees of freedom.
     """
-    value, low, high, sd = (row[f"{measure}{end}"] for end in ("", "_low", "_high", "_sd"))
+    value, low, high = (row[f"{measure}{end}"] for end in ("", "_low", "_high"))
+    sd = row.get(f"{measure}_sd")  # not in tables of single runs
     if row.get("limits_of") == "paths and seeds":
         return [value, low, high]
     if row["n_seeds"] == 1:
