@@ -57,7 +57,7 @@ plan: smoke  ## what paper costs, and what such plans are worth (results/benchma
 	mkdir -p results/benchmarks/smoke && cp results/smoke/benchmarks.csv results/benchmarks/smoke/
 	$(BIN)/synfeal plan --profile paper --cores 16 64 --csv results/benchmarks/plan_paper.csv
 	for run in night labels dose controls tracking transfer curves scratch sanctuary \
-	    better_labels shapes maps sanctuary_labels; do \
+	    better_labels more_sanctuary shapes maps sanctuary_labels; do \
 	  $(BIN)/synfeal plan --profile config/$$run.yaml --cores 2 \
 	    --csv results/benchmarks/plan_$$run.csv || exit 1; done
 	$(BIN)/synfeal plan --measured results/benchmarks/smoke results/published/night \

@@ -31,7 +31,7 @@ BENCHMARKS = RESULTS / "benchmarks"
 # No chance enters the claims about the set-up, and C9 is not judged (docs/rules.md).
 NOT_DRAWN = ("C9",)
 # Of these it was announced, before their last run, that no other would follow under the same rules.
-NOT_AGAIN = ("C3", "C10")
+NOT_AGAIN = ("C3", "C8", "C10")
 # What `measured_true` has beside the changes that are judged.
 BESIDE = re.compile("; (?:sign tests|tau)")
 # Verdicts that say more than *smaller than published*: where one run gives one of them and another
@@ -66,6 +66,7 @@ RUNS = (
     JudgingRun("scratch", ("C10",)),
     JudgingRun("tracking", ("C15",)),
     JudgingRun("better_labels", ("C3",)),
+    JudgingRun("more_sanctuary", ("C8",)),
 )
 
 
