@@ -1,4 +1,4 @@
-"""What the share of matched points that an SfM model explains tells about its error.
+"""Set the share of matched points that an SfM model explains beside the model's error.
 
     python -m benchmarks.explained results/benchmarks/explained.csv --results results \
         --runs better_labels sanctuary_labels

@@ -20,6 +20,7 @@ from reproduction.claims.rules import frozen_rules
 from reproduction.claims.verdicts import GROUPS
 from reproduction.design.profiles import read_profile
 from reproduction.design.shapes import SHAPES
+from reproduction.design.shapes import TABLE as SHAPES_ROWS
 from reproduction.report.fresh import is_fresh
 from reproduction.report.intervals import Interval, cell_interval, mean_change
 from reproduction.report.publish import PUBLISHED
@@ -54,7 +55,6 @@ NOISE_SCORES = {
     "yardstick": ("yardstick_{}", "{}_true"),
     "true": ("{}_true", "{}_true"),
 }
-SHAPES_ROWS = "table6_label_errors"
 # Chance, in a sign test, below which so many signs alike are no accident.
 SURPRISING = 0.05
 
@@ -582,7 +582,7 @@ NEEDED = (
     "table2_ground_truth",
     "table3_inconsistencies",
     "table4_size",
-    "table6_label_errors",
+    SHAPES_ROWS,
     "table7_images_shown",
     "references",
     "label_error",

@@ -8,19 +8,24 @@ import numpy as np
 import pytest
 
 from baselines.config.learning import MODELS
-from reproduction.claims import evidence as reading
 from reproduction.claims import untrained
 from reproduction.claims.judging import JUDGES
 from reproduction.claims.rules import frozen_rules
 from reproduction.claims.table import claims_markdown, verdict_counts, write_claims
 from reproduction.claims.verdicts import GROUPS, Verdict, published_claims
-from reproduction.statistics.limits import MEASURES
-from reproduction.statistics.seeds import Borrowed
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
 from synfeal.records.tables import read_records
 from tests.support import claims_results as made
-from tests.support.claims_results import AXES, assisted, collected_at, curves, first_paths, put
+from tests.support.claims_results import (
+    AXES,
+    assisted,
+    collected_at,
+    curves,
+    first_paths,
+    lend,
+    put,
+)
 from tests.support.report_results import design_of, experiment, fill_assistance
 
 HOLDS, SMALLER, MIXED, NEGLIGIBLE, LESS, OPPOSITE, REFUTED, UNDECIDED, *_ = Verdict
@@ -32,12 +37,6 @@ def _tracker_that_reaches_metres(monkeypatch):
     """Frames of these results lie metres apart, and single runs vary no further."""
     monkeypatch.setattr(untrained, "FARTHEST_M", np.inf)
     lend(monkeypatch, 0.0)
-
-
-def lend(monkeypatch, relative_sd):
-    """Single runs borrow this deviation over seeds."""
-    lent = {(m, e): Borrowed(relative_sd, 16) for m in MODELS for e in MEASURES}
-    monkeypatch.setattr(reading, "borrowed_deviations", lambda: lent)
 
 
 @pytest.fixture(scope="module")

@@ -5,16 +5,13 @@ import pandas as pd
 import pytest
 
 from baselines.config.learning import MODELS
-from reproduction.claims import evidence as reading
 from reproduction.claims.label_shapes import shape_changes_table, side_table, write_shape_changes
 from reproduction.design.files import Files
 from reproduction.design.jobs import jobs_of_run
 from reproduction.design.shapes import shape_rows
-from reproduction.statistics.limits import MEASURES
-from reproduction.statistics.seeds import Borrowed
 from reproduction.tables.columns import side_sheet
 from tests.reproduction.test_design_files import files_of
-from tests.support.claims_results import FRAMES_OF_PATH, N_PATHS, Results, rows_where
+from tests.support.claims_results import FRAMES_OF_PATH, N_PATHS, Results, lend, rows_where
 from tests.support.report_results import design_of, experiment
 
 TABLE = "table6_label_errors"
@@ -42,12 +39,6 @@ def results(tmp_path):
         for place, model in enumerate(MODELS, start=1):
             made.write(row, model, hard * np.array([0.02, 1.0]) * place * factor)
     return made
-
-
-def lend(monkeypatch, relative_sd):
-    """Single runs borrow this deviation over seeds."""
-    lent = {(m, e): Borrowed(relative_sd, 16) for m in MODELS for e in MEASURES}
-    monkeypatch.setattr(reading, "borrowed_deviations", lambda: lent)
 
 
 def changes(results):
@@ -78,7 +69,7 @@ def test_single_runs_vary_as_much_as_they_borrow(results, monkeypatch):
     assert 1.9 * sd < value - low < 2.4 * sd
 
 
-def test_what_harms_one_path_alone_widens_the_limits(results, monkeypatch):
+def test_what_harms_some_paths_alone_widens_the_limits(results, monkeypatch):
     lend(monkeypatch, 0.0)
     row = rows_where(results, labels="bend", **LARGEST)[0]
     errors = np.full((N_PATHS * FRAMES_OF_PATH, 2), [0.2, 10.0])
