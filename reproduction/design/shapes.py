@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -43,11 +44,24 @@ def shape_rows(rows: Iterable[Experiment]) -> ShapeRows | None:
     exact = {(row.scene, row.size): row for row in table if row.labels == SIMULATOR}
     wrong = [row for row in table if row.labels in SHAPES]
     for key in sorted(exact):
-        of_size: dict[tuple[float, float], dict[str, Experiment]] = {}
-        for row in wrong:
-            if (row.scene, row.size) == key:
-                of_size.setdefault((row.noise_m, row.noise_deg), {})[row.labels] = row
-        complete = [size for size, found in of_size.items() if len(found) == len(SHAPES)]
-        if complete:
-            return ShapeRows(exact[key], of_size[max(complete)])
+        own = [row for row in wrong if (row.scene, row.size) == key]
+        largest = largest_in_all_shapes((row.labels, row.noise_m, row.noise_deg) for row in own)
+        if largest is not None:
+            chosen = [row for row in own if (row.noise_m, row.noise_deg) == largest]
+            return ShapeRows(exact[key], {row.labels: row for row in chosen})
     return None
+
+
+def largest_in_all_shapes(errors: Iterable[tuple[str, float, float]]) -> tuple[float, float] | None:
+    """Return the largest size of label errors that is there in all shapes.
+
+    Args:
+        errors: Shape, position error in metres and orientation error in degrees of each label set.
+
+    Returns:
+        Metres and degrees; None where no size is there in all shapes.
+    """
+    shapes: defaultdict[tuple[float, float], set[str]] = defaultdict(set)
+    for shape, position_m, orientation_deg in errors:
+        shapes[position_m, orientation_deg].add(shape)
+    return max((size for size, found in shapes.items() if found >= {*SHAPES}), default=None)

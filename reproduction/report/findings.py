@@ -19,7 +19,7 @@ from reproduction.claims.label_shapes import SCHEMA as SHAPES_SCHEMA
 from reproduction.claims.rules import frozen_rules
 from reproduction.claims.verdicts import GROUPS
 from reproduction.design.profiles import read_profile
-from reproduction.design.shapes import SHAPES
+from reproduction.design.shapes import SHAPES, largest_in_all_shapes
 from reproduction.design.shapes import TABLE as SHAPES_ROWS
 from reproduction.report.fresh import is_fresh
 from reproduction.report.intervals import Interval, cell_interval, mean_change
@@ -224,7 +224,7 @@ def shape_changes(root: Path) -> dict[str, tuple[Interval, Interval]]:
     if _has_by_frame(root):
         return _shapes_by_frame(root)
     cells = read_table(root, SHAPES_ROWS)
-    clean, wrong = cells[cells.labels == "synfeal"], largest_in_all_shapes(root)
+    clean, wrong = cells[cells.labels == "synfeal"], largest_label_errors(root)
     changes = {
         shape: _changes(clean, wrong[wrong.labels == shape]) for shape in SHAPES if len(wrong)
     }
@@ -232,25 +232,18 @@ def shape_changes(root: Path) -> dict[str, tuple[Interval, Interval]]:
     return changes | ({"noise": paired} if paired and changes else {})
 
 
-def largest_in_all_shapes(root: Path) -> pd.DataFrame:
-    """Select the rows of the largest label errors that Table 6 has in all shapes.
-
-    They are those that :func:`reproduction.design.shapes.shape_rows` compares.
-    """
+def largest_label_errors(root: Path) -> pd.DataFrame:
+    """Select the rows of the largest label errors that Table 6 has in all shapes."""
     cells = read_table(root, SHAPES_ROWS)
     wrong = cells[cells.labels.isin([*SHAPES])]
-    sizes = [
-        size
-        for size, rows in wrong.groupby(["noise_m", "noise_deg"])
-        if {*rows.labels} == {*SHAPES}
-    ]
-    largest = max(sizes, default=(math.nan, math.nan))
-    return wrong[(wrong.noise_m == largest[0]) & (wrong.noise_deg == largest[1])]
+    sizes = zip(wrong.labels, wrong.noise_m, wrong.noise_deg, strict=True)
+    noise_m, noise_deg = largest_in_all_shapes(sizes) or (math.nan, math.nan)
+    return wrong[(wrong.noise_m == noise_m) & (wrong.noise_deg == noise_deg)]
 
 
 def off_in_all_shapes(root: Path) -> tuple[float, float]:
     """Return how far off these labels are, metres and degrees; NaN where there are none."""
-    rows = largest_in_all_shapes(root)
+    rows = largest_label_errors(root)
     if rows.empty:
         return math.nan, math.nan
     row = rows.iloc[0]
@@ -519,8 +512,10 @@ def where_labels_fail(root: Path) -> str:
     changes = paired_changes(root, "C2")
     if changes is None or not any(change.high < 1 for change in changes):
         return ""
-    batches = _of_sfm(read_table(root, "assistance", ASSISTANCE))
-    labels = _of_sfm(read_table(root, "label_error", LABEL_ERROR).query("assistance == 'after'"))
+    found = sfm_training_labels(root)
+    if found is None:
+        return ""
+    batches, labels = found
     if not batches.assisted:
         return ""
     return (
@@ -531,10 +526,23 @@ def where_labels_fail(root: Path) -> str:
     )
 
 
-def _of_sfm(rows: pd.DataFrame) -> Any:
-    """Select the row of SfM's training labels in the Large Room."""
-    own = (rows.scene == ROOM) & (rows["size"] == SMALL) & (rows.method == "sfm")
-    return rows_of(rows[own & (rows.split == "train")])[0]
+def sfm_training_labels(root: Path) -> tuple[Any, Any] | None:
+    """Select how SfM fared on the training set of the small Large Room.
+
+    Returns:
+        Its rows of ``assistance.csv`` and, after assistance, of ``label_error.csv``; None where the
+        run has no such labels.
+    """
+    found = []
+    for name, schema in (("assistance", ASSISTANCE), ("label_error", LABEL_ERROR)):
+        rows = read_table(root, name, schema)
+        own = (rows.scene == ROOM) & (rows["size"] == SMALL) & (rows.method == "sfm")
+        found.append(rows[own & (rows.split == "train")])
+    batches, errors = found
+    after = errors[errors.assistance == "after"]
+    if batches.empty or after.empty:
+        return None
+    return rows_of(batches)[0], rows_of(after)[0]
 
 
 def fresh_run(root: Path, profile: str) -> Path:

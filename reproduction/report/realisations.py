@@ -12,16 +12,20 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from reproduction.report.findings import paired_changes, percent, read_table
+from reproduction.report.findings import (
+    paired_changes,
+    percent,
+    read_table,
+    sfm_training_labels,
+)
 from reproduction.report.fresh import SEEN_SEED
 from reproduction.report.intervals import Interval
 from reproduction.report.published_claims import read_published
-from reproduction.tables.label_error import SCHEMA as LABEL_ERROR
 from reproduction.tables.sheet import markdown_table
 from synfeal.records.tables import rows_of
 
 # C2 compares PoseNet2 on these labels with PoseNet2 on exact ones.
-CLAIM, METHOD, MODEL, SCENE = "C2", "sfm", "posenet2", "large_room"
+CLAIM, METHOD, MODEL = "C2", "sfm", "posenet2"
 # Training frames of the paper's smallest set; smaller profiles have wider gaps between frames.
 PAPER_FRAMES = 6000
 
@@ -52,32 +56,30 @@ def realisations(published: Path) -> list[Realisation]:
     Args:
         published: Folder of the published runs.
     """
-    found = []
-    for root in sorted(path.parent for path in published.glob("*/claims.csv")):
-        changes = paired_changes(root, CLAIM)
-        if changes is not None:
-            found += _of_run(root, changes)
-    return found
+    roots = sorted(path.parent for path in published.glob("*/claims.csv"))
+    found = (realisation(root) for root in roots)
+    return [own for own in found if own is not None]
 
 
-def _of_run(root: Path, changes: tuple[Interval, Interval]) -> list[Realisation]:
-    """Describe the labels of a run; nothing where they are not of the paper's frames."""
-    errors = read_table(root, "label_error", LABEL_ERROR)
-    own = (errors.scene == SCENE) & (errors.method == METHOD) & (errors.frames == PAPER_FRAMES)
-    labels = errors[own & (errors.split == "train") & (errors.assistance == "after")]
+def realisation(root: Path) -> Realisation | None:
+    """Describe SfM's labels of a run; None where it has none of the paper's frames."""
+    changes = paired_changes(root, CLAIM)
+    if changes is None:
+        return None
+    labels = sfm_training_labels(root)
+    if labels is None or labels[1].frames != PAPER_FRAMES:
+        return None
+    _, errors = labels
     cells = read_table(root, "table2_ground_truth")
     (trained,) = rows_of(cells[(cells.labels == METHOD) & (cells.model == MODEL)])
-    return [
-        Realisation(
-            profile=root.name,
-            seed=read_published(root)[0].get("seed") or SEEN_SEED,
-            n_runs=trained.n_seeds,
-            position_m=row.position_m_median,
-            position_rmse_m=row.position_m_rmse,
-            changes=changes,
-        )
-        for row in rows_of(labels)
-    ]
+    return Realisation(
+        profile=root.name,
+        seed=read_published(root)[0].get("seed") or SEEN_SEED,
+        n_runs=trained.n_seeds,
+        position_m=errors.position_m_median,
+        position_rmse_m=errors.position_m_rmse,
+        changes=changes,
+    )
 
 
 def realisations_table(published: Path) -> str:
