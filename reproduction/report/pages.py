@@ -100,8 +100,8 @@ def origin(root: Path) -> str:
     """Name the run that the numbers are of."""
     record = read_result(root / "provenance.json", ("commit", "machine", "stages"), "publish again")
     cells = read_table(root, "table4_size")
-    first, seeds = cells.iloc[0], sorted(set(cells.n_seeds))
-    share = PAPER_FRAMES / first.n_train  # the first row is of the smallest set
+    seeds = sorted(set(cells.n_seeds))
+    share = PAPER_FRAMES / cells.n_train.min()
     frames = "the paper's frames" if share == 1 else f"1/{share:.3g} of the paper's frames"
     span = " to ".join(map(str, dict.fromkeys((seeds[0], seeds[-1]))))
     runs = f"{span} training run{'' if span == '1' else 's'} per cell"
