@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from baselines.config.learning import ModelName, TrainingConfig
 from synfeal.config.collection import Count
@@ -29,20 +29,26 @@ KEYS: Mapping[str, tuple[str, ...]] = {
 }
 assert set(KEYS) == set(get_args(TableName))
 
-if TYPE_CHECKING:
-    Repeated = str
-else:
-    Repeated = Literal["default", TableName, ModelName]
-
-# Seeds per run of a table or of a localizer; `default` where neither is named.
-Repetitions = dict[Repeated, Count]
+DEFAULT = "default"
+# Seeds per run of a table, of a localizer or of a size; `DEFAULT` where none of them is named.
+Repetitions = dict[str, Count]
 
 
 class RepeatedTraining(TrainingConfig):
     """Training of all localizers, and its repetitions."""
 
     repetitions: Repetitions = Field(
-        {"default": 1},
-        description="seeds per run, by table or localizer; a run that several of them name gets"
-        " the most",
+        {DEFAULT: 1},
+        description="seeds per run, by table, localizer or size; a run that several of them name"
+        " gets the most",
     )
+
+    @field_validator("repetitions")
+    @classmethod
+    def _are_named(cls, repetitions: Repetitions, info: ValidationInfo) -> Repetitions:
+        """Refuse names that no run could have."""
+        known = [DEFAULT, *KEYS, *get_args(ModelName), *info.data.get("samples_seen", ())]
+        for name in repetitions:
+            if name not in known:
+                raise ValueError(f"{name!r} is not one of {', '.join(known)}")
+        return repetitions

@@ -255,13 +255,13 @@ class Design(Strict):
 
     @property
     def runs(self) -> list[Run]:
-        """Every run, each once: as many repetitions as its tables and its localizer ask for."""
+        """Every run, each once, as often as its tables, its localizer or its size ask for."""
         runs = {
             Run(e.scene, e.size, e.label_id, e.init, model, repetition)
             for row in self.rows
             for e in _compared(row)
             for model in MODELS
-            for repetition in range(self._asked(row.table, model))
+            for repetition in range(self._asked(row.table, model, e.size))
         }
         return sorted(runs)
 
@@ -277,7 +277,7 @@ class Design(Strict):
         """List all repetitions of a cell, whichever table asked for them."""
         cell = (row.scene, row.size, row.label_id, row.init)
         asked = [
-            self._asked(other.table, model)
+            self._asked(other.table, model, row.size)
             for other in self.rows
             for e in _compared(other)
             if (e.scene, e.size, e.label_id, e.init) == cell
@@ -292,8 +292,8 @@ class Design(Strict):
         rows = [e for row in self.rows_of(table) for e in _compared(row)]
         return sorted({run for row in rows for model in MODELS for run in self.runs_of(row, model)})
 
-    def _asked(self, table: TableName, model: ModelName) -> int:
-        named = [self.repetitions[name] for name in (table, model) if name in self.repetitions]
+    def _asked(self, table: TableName, model: ModelName, size: str) -> int:
+        named = [self.repetitions[n] for n in (table, model, size) if n in self.repetitions]
         return max(named, default=self.repetitions.get("default", 1))
 
 

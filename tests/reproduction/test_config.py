@@ -115,10 +115,30 @@ def test_a_run_is_repeated_as_often_as_its_localizer_asks():
     assert len(design.table_runs("table2_ground_truth")) == 2 * (5 + 4 * 2)
 
 
-def test_repetitions_of_an_unknown_table_are_refused(tmp_path):
+def test_a_run_is_repeated_as_often_as_its_size_asks():
+    rows = [experiment("table4_size", size=size) for size in ("6k", "20k", "80k")]
+    rows.append(experiment("table5_from_scratch", size="20k", init="scratch"))
+    asked = {"default": 1, "6k": 3, "80k": 4, "table5_from_scratch": 2}
+    design = Design(rows=rows, repetitions=asked)
+    found = Counter((r.size, r.init) for r in design.runs if r.model == "posenet")
+    # Table 5 compares with transfer learning, so that its own number holds there, too.
+    assert found == {
+        ("6k", "pretrained"): 3,
+        ("20k", "pretrained"): 2,
+        ("20k", "scratch"): 2,
+        ("80k", "pretrained"): 4,
+    }
+    assert [run.repetition for run in design.runs_of(rows[2], "posenet")] == [0, 1, 2, 3]
+    assert len(design.table_runs("table4_size")) == 5 * (3 + 2 + 4)
+
+
+def test_repetitions_of_an_unknown_table_or_size_are_refused(tmp_path):
     override = tmp_path / "mine.yaml"
     override.write_text("training: {repetitions: {table9_nothing: 3}}\n")
-    with pytest.raises(InputError, match=r"training\.repetitions\.table9_nothing: .*'default'"):
+    with pytest.raises(InputError, match=r"training\.repetitions.*'table9_nothing'.*default.*95k"):
+        load_config(CONFIG / "config.yaml", override)
+    override.write_text("training: {repetitions: {7k: 3}}\n")
+    with pytest.raises(InputError, match=r"training\.repetitions.*'7k'"):
         load_config(CONFIG / "config.yaml", override)
     override.write_text("training: {repetitions: {table3_inconsistencies: 3}}\n")
     design = read_design(load_config(CONFIG / "config.yaml", override))
