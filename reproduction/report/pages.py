@@ -35,6 +35,7 @@ from reproduction.report.fresh import fresh_answer, fresh_claims
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
 from reproduction.report.realisations import PAPER_FRAMES, realisations_table
+from reproduction.report.run_anew import run_anew
 from reproduction.runs.results import read_result
 from reproduction.tables.assistance import SCHEMA as ASSISTANCE
 from reproduction.tables.assistance import TOTAL
@@ -192,6 +193,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "noise": noise_table,
     "assistance": assistance,
     "claims": claims,
+    "anew": run_anew,
     # Of all published runs together, whatever profile the mark names.
     "fresh": lambda root: fresh_claims(root.parent),
     "realisations": lambda root: realisations_table(root.parent),

@@ -1,0 +1,78 @@
+"""Which rows of a run's tables were run again with fresh seeds, and how often they were trained.
+
+No run with a fresh seed has all tables: each has the rows of some claims or findings. This module
+says what they have together of the rows of the run that was seen before the rules were frozen.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from reproduction.config.tables import KEYS
+from reproduction.report.findings import read_table
+from reproduction.report.fresh import is_fresh
+from reproduction.report.html.tables import table_title
+from reproduction.report.published_claims import read_published
+from reproduction.tables.sheet import markdown_table
+
+# What the last line of each table counts: rows that any of the runs has.
+TOGETHER = "together"
+
+
+def run_anew(root: Path) -> str:
+    """Tabulate what published runs with fresh seeds have of a run's rows, table by table.
+
+    Args:
+        root: The run, among other published ones.
+    """
+    fresh = [
+        path.parent
+        for path in sorted(root.parent.glob("*/claims.csv"))
+        if is_fresh(read_published(path.parent))
+    ]
+    records = []
+    for table, keys in KEYS.items():
+        if not _has(root, table):
+            continue
+        asked = _rows(read_table(root, table), keys)
+        met: set[tuple[object, ...]] = set()
+        for run in (run for run in fresh if _has(run, table)):
+            cells = read_table(run, table)
+            again = asked & {*_rows(cells, keys)}
+            if again:
+                met |= again
+                records.append(_record(table, f"`{run.name}`", again, asked, _training_runs(cells)))
+        records.append(_record(table, TOGETHER, met, asked, ""))
+    return markdown_table(pd.DataFrame(records))
+
+
+def _has(root: Path, table: str) -> bool:
+    return (root / "tables" / f"{table}.csv").is_file()
+
+
+def _rows(cells: pd.DataFrame, keys: tuple[str, ...]) -> set[tuple[object, ...]]:
+    """Return the rows that the cells of the five localizers are of."""
+    return {*cells[[*keys]].itertuples(index=False, name=None)}
+
+
+def _training_runs(cells: pd.DataFrame) -> str:
+    fewest, most = int(cells.n_seeds.min()), int(cells.n_seeds.max())
+    return str(fewest) if fewest == most else f"{fewest} to {most}"
+
+
+def _record(
+    table: str,
+    run: str,
+    again: set[tuple[object, ...]],
+    asked: set[tuple[object, ...]],
+    training_runs: str,
+) -> dict[str, str]:
+    """Describe a line of the table that :func:`run_anew` makes."""
+    return {
+        "table": table_title(table),
+        "run": run,
+        "rows": f"{len(again)} of {len(asked)}",
+        "training runs per cell": training_runs,
+    }
