@@ -16,6 +16,7 @@ from reproduction.report.fresh import is_fresh
 from reproduction.report.html.tables import table_title
 from reproduction.report.published_claims import read_published
 from reproduction.tables.sheet import markdown_table
+from synfeal.errors import InputError
 
 # What the last line of each table counts: rows that any of the runs has.
 TOGETHER = "together"
@@ -26,16 +27,20 @@ def run_anew(root: Path) -> str:
 
     Args:
         root: The run, among other published ones.
+
+    Raises:
+        InputError: It is not published, or has no table of training runs.
     """
+    tables = {name: keys for name, keys in KEYS.items() if _has(root, name)}
+    if not tables:
+        raise InputError(f"{root}: has no table of training runs; publish again")
     fresh = [
         path.parent
         for path in sorted(root.parent.glob("*/claims.csv"))
         if is_fresh(read_published(path.parent))
     ]
     records = []
-    for table, keys in KEYS.items():
-        if not _has(root, table):
-            continue
+    for table, keys in tables.items():
         asked = _rows(read_table(root, table), keys)
         met: set[tuple[object, ...]] = set()
         for run in (run for run in fresh if _has(run, table)):
