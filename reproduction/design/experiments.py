@@ -13,7 +13,7 @@ from baselines.config.labels import NoiseDose
 from baselines.config.learning import MODELS, ModelName
 from baselines.labels.injected import LABEL_ERRORS, moved_m
 from reproduction.config.profile import Config
-from reproduction.config.tables import KEYS, Repetitions, TableName
+from reproduction.config.tables import DEFAULT, KEYS, Repetitions, TableName
 from synfeal.config.collection import NonNegative, Strict
 from synfeal.config.load import describe
 from synfeal.errors import InputError
@@ -294,7 +294,7 @@ class Design(Strict):
 
     def _asked(self, table: TableName, model: ModelName, size: str) -> int:
         named = [self.repetitions[n] for n in (table, model, size) if n in self.repetitions]
-        return max(named, default=self.repetitions.get("default", 1))
+        return max(named, default=self.repetitions.get(DEFAULT, 1))
 
 
 def common_every(counts: Collection[int]) -> int:

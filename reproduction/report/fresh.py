@@ -19,7 +19,7 @@ import pandas as pd
 from reproduction.claims.rules import frozen_rules
 from reproduction.claims.verdicts import GROUPS, MEANINGS, Claim, Verdict, published_claims
 from reproduction.report.publish import PUBLISHED, RESULTS
-from reproduction.report.published_claims import read_published, rules_of
+from reproduction.report.published_claims import published_runs, read_published, rules_of
 from reproduction.runs.results import read_result
 from reproduction.tables.sheet import markdown_table
 from synfeal.errors import InputError
@@ -137,7 +137,7 @@ def judged_fresh(published: Path = PUBLISHED) -> dict[str, list[Judged]]:
     """
     claims = {claim.id: claim for claim in claims_to_test()}
     found: dict[str, list[Judged]] = {name: [] for name in claims}
-    for root in sorted(path.parent for path in published.glob("*/claims.csv")):
+    for root in published_runs(published):
         rows = read_published(root)
         if is_fresh(rows):
             for row in rows:

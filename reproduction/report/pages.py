@@ -35,7 +35,7 @@ from reproduction.report.fresh import fresh_answer, fresh_claims
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
 from reproduction.report.realisations import PAPER_FRAMES, realisations_table
-from reproduction.report.run_anew import run_anew
+from reproduction.report.run_anew import run_anew, training_runs
 from reproduction.runs.results import read_result
 from reproduction.tables.assistance import SCHEMA as ASSISTANCE
 from reproduction.tables.assistance import TOTAL
@@ -101,10 +101,9 @@ def origin(root: Path) -> str:
     """Name the run that the numbers are of."""
     record = read_result(root / "provenance.json", ("commit", "machine", "stages"), "publish again")
     cells = read_table(root, "table4_size")
-    seeds = sorted(set(cells.n_seeds))
     share = PAPER_FRAMES / cells.n_train.min()
     frames = "the paper's frames" if share == 1 else f"1/{share:.3g} of the paper's frames"
-    span = " to ".join(map(str, dict.fromkeys((seeds[0], seeds[-1]))))
+    span = training_runs(cells)
     runs = f"{span} training run{'' if span == '1' else 's'} per cell"
     return (
         f"Profile `{root.name}`: {frames}, {runs}, at commit"

@@ -27,6 +27,11 @@ BEFORE_FREEZE = "2026-11-22g"
 Row = Mapping[str, str]
 
 
+def published_runs(published: Path) -> list[Path]:
+    """List the folders of the published runs that judge claims, by name."""
+    return sorted(path.parent for path in published.glob("*/claims.csv"))
+
+
 def read_published(root: Path) -> list[dict[str, str]]:
     """Read the rows of ``claims.csv``, as they were published."""
     path = root / "claims.csv"

@@ -20,7 +20,7 @@ from reproduction.report.findings import (
 )
 from reproduction.report.fresh import SEEN_SEED
 from reproduction.report.intervals import Interval
-from reproduction.report.published_claims import read_published
+from reproduction.report.published_claims import published_runs, read_published
 from reproduction.tables.sheet import markdown_table
 from synfeal.records.tables import rows_of
 
@@ -56,8 +56,7 @@ def realisations(published: Path) -> list[Realisation]:
     Args:
         published: Folder of the published runs.
     """
-    roots = sorted(path.parent for path in published.glob("*/claims.csv"))
-    found = (realisation(root) for root in roots)
+    found = (realisation(root) for root in published_runs(published))
     return [own for own in found if own is not None]
 
 

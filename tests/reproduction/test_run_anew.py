@@ -46,7 +46,7 @@ def test_rows_and_training_runs_are_those_of_the_published_tables():
         found = read(PUBLISHED / run.strip("`") / "tables" / f"{name}.csv", keys)
         again = asked & {*found}
         assert rows == f"{len(again)} of {len(asked)}"
-        counts = {count for row in found for count in found[row]}
+        counts = {count for row in again for count in found[row]}
         assert runs == " to ".join(str(n) for n in sorted({min(counts), max(counts)}))
         together.setdefault(title, set()).update(again)
     assert not together
