@@ -44,7 +44,7 @@ from synfeal.render.base import Renderer, reference_images
 POSES, ROUNDS = 6, 5
 USUAL = RenderConfig(backend="opengl")
 SAMPLES = (1, 2, 3)
-COLOURS = {"full": BLUE, "chosen": VERMILION, "textures 1/4": ORANGE, "faces 1/4": GREEN}
+COLORS = {"full": BLUE, "chosen": VERMILION, "textures 1/4": ORANGE, "faces 1/4": GREEN}
 
 Poses = NDArray[np.float64]
 
@@ -138,7 +138,7 @@ def draw(path: Path, table: pd.DataFrame) -> None:
             for row, (size, rows) in enumerate(of_scene.groupby(["width", "height"], sort=False)):
                 panel = panels[row, column]
                 for level, of_level in rows.groupby("level", sort=False):
-                    style = {"color": COLOURS[str(level)], "marker": "o", "markersize": 4}
+                    style = {"color": COLORS[str(level)], "marker": "o", "markersize": 4}
                     line = of_level.sort_values("supersampling")
                     panel.plot(line["cpu_ms"], line["error_levels"], label=str(level), **style)
                 shipped = {"level": shipped_level(rows), "supersampling": str(USUAL.supersampling)}

@@ -39,8 +39,8 @@ class Loop:
             # trimesh drops the vertex colours of a mesh that has a material. Ours, without light,
             # are another attribute of the same file.
             if "_SRGB" in mesh.vertex_attributes:
-                colours = mesh.vertex_attributes["_SRGB"]
-                mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=colours)
+                colors = mesh.vertex_attributes["_SRGB"]
+                mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=colors)
         self._scene = pyrender.Scene.from_trimesh_scene(loaded, bg_color=np.zeros(4))
         focal_px = 0.5 * width / np.tan(np.radians(0.5 * options.fov))
         self._camera = self._scene.add(

@@ -105,12 +105,12 @@ def main() -> None:
     )
     visible, matching, shuffled = 0, [], []
     for batch in loader:
-        colour_a = sample(batch["image_a"], batch["points_a"])
-        colour_b = sample(batch["image_b"], batch["points_b"])
+        color_a = sample(batch["image_a"], batch["points_a"])
+        color_b = sample(batch["image_b"], batch["points_b"])
         seen = batch["visible"]
-        other = colour_b.roll(1, dims=-1)
-        matching.append((colour_a - colour_b).abs().mean(1)[seen])
-        shuffled.append((colour_a - other).abs().mean(1)[seen])
+        other = color_b.roll(1, dims=-1)
+        matching.append((color_a - color_b).abs().mean(1)[seen])
+        shuffled.append((color_a - other).abs().mean(1)[seen])
         visible += int(seen.sum())
     levels = [255.0 * float(torch.cat(each).median()) for each in (matching, shuffled)]
     print(

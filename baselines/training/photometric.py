@@ -103,11 +103,11 @@ class PhotometricRandomisation:
         width = torch.where(self._uniform(count) < config.share, width, 0.0)
         left = (self._uniform(count) * (side - width + 1)).floor()
         top = (self._uniform(count) * (side - height + 1)).floor()
-        colour = self._uniform(count, 3)
-        return Rectangles(left.long(), top.long(), width.long(), height.long(), colour)
+        color = self._uniform(count, 3)
+        return Rectangles(left.long(), top.long(), width.long(), height.long(), color)
 
 
-def filled(images: Tensor, level: int, colours: Tensor) -> Tensor:
+def filled(images: Tensor, level: int, colors: Tensor) -> Tensor:
     """Fill the empty pixels of images (B, 3, H, W) uint8 with smooth random colours.
 
     A pixel is empty if no channel is above ``level``, or if it lies beside such a pixel, where the
@@ -116,12 +116,12 @@ def filled(images: Tensor, level: int, colours: Tensor) -> Tensor:
     Args:
         images: Images; nothing is drawn where they are black.
         level: Grey level.
-        colours: Between 0 and 1 (B, 3, n, n), of a grid over the image that is interpolated.
+        colors: Between 0 and 1 (B, 3, n, n), of a grid over the image that is interpolated.
     """
     empty = (images.amax(1, keepdim=True) <= level).float()
     empty = nn.functional.max_pool2d(empty, 3, stride=1, padding=1) > 0
     fill = nn.functional.interpolate(
-        255 * colours.to(images.device), images.shape[2:], mode="bilinear", align_corners=True
+        255 * colors.to(images.device), images.shape[2:], mode="bilinear", align_corners=True
     )
     return torch.where(empty, fill.round().byte(), images)
 

@@ -144,9 +144,9 @@ def _draw_errors(position: Axes, orientation: Axes, methods: Mapping[str, Labell
 def _draw_batches(axes: Axes, methods: Mapping[str, LabelledSplit]) -> None:
     """Draw one bar per method: filled for assisted batches, crossed for lost ones."""
     for place, (method, part) in enumerate(methods.items()):
-        colour = METHOD_STYLES[method]["color"]
+        color = METHOD_STYLES[method]["color"]
         for batch in part.batches:
-            face = {"facecolor": colour if batch["assisted"] else "white"}
+            face = {"facecolor": color if batch["assisted"] else "white"}
             span = (batch["start"], batch["stop"] - 1 - batch["start"])
             axes.broken_barh(
                 [span],
@@ -217,13 +217,13 @@ def draw_paths(axes: Axes, part: LabelledSplit, method: str) -> None:
     offsets.set(linewidths=0.4, alpha=0.6, zorder=3, label="from true to estimated position")
     axes.add_collection(offsets)
     axes.plot(*truth.T, label="true path", zorder=2, **TRUTH)
-    colour = METHOD_STYLES[method]["color"]
-    axes.plot(*labels.T, label="estimated path", zorder=4, color=colour, linewidth=1.0)
+    color = METHOD_STYLES[method]["color"]
+    axes.plot(*labels.T, label="estimated path", zorder=4, color=color, linewidth=1.0)
     wide = LineCollection([labels[batch["start"] : batch["stop"]] for batch in assisted])
-    wide.set(color=colour, linewidth=4.0, alpha=0.3, zorder=3.5, label="assisted batch")
+    wide.set(color=color, linewidth=4.0, alpha=0.3, zorder=3.5, label="assisted batch")
     axes.add_collection(wide)
     starts = [batch["start"] for batch in part.batches]
-    _mark(axes, labels[starts], "first frame of a batch", 3, colour)
+    _mark(axes, labels[starts], "first frame of a batch", 3, color)
     ends = [batch["stop"] - 1 for batch in assisted]
     _mark(axes, labels[ends], "assisted: replaced by the true pose", 6, "white")
 

@@ -82,8 +82,8 @@ def _draw_meshes(axes: Axes, rows: pd.DataFrame, style: Style) -> None:
     speed, error = (rows["items_per_s"] / 1e6).to_numpy(), 100.0 * rows["error"].to_numpy()
     front = pareto_front(1.0 / speed, error)
     order = np.argsort(speed[front], kind="stable")
-    colour = style["color"]
-    open_marks = {"marker": style["marker"], "markerfacecolor": "none", "markeredgecolor": colour}
+    color = style["color"]
+    open_marks = {"marker": style["marker"], "markerfacecolor": "none", "markeredgecolor": color}
     axes.plot(speed[~front], error[~front], linestyle="", markersize=4, alpha=0.6, **open_marks)
     scene = scene_title(rows["scene"].iloc[0])
     axes.plot(
@@ -97,7 +97,7 @@ def _draw_meshes(axes: Axes, rows: pd.DataFrame, style: Style) -> None:
     full = rows["faces"].iloc[0]
     for place in np.flatnonzero(rows["chosen"] == 1).tolist():
         label = f"{scene}: used, {rows['faces'].iloc[place]:,.0f} of {full:,.0f} faces"
-        axes.plot(speed[place], error[place], label=label, markeredgecolor=colour, **RING)
+        axes.plot(speed[place], error[place], label=label, markeredgecolor=color, **RING)
 
 
 def labels_figure(rows: pd.DataFrame) -> Figure:
@@ -149,10 +149,10 @@ def _draw_named(axes: Axes, rows: pd.DataFrame, factor: float = 1.0) -> None:
         axes.plot(row.items_per_s, factor * row.error, label=row.variant, **look)
 
 
-COLOURS = {"opengl": BLUE, "pyrender": VERMILION, "raycast": GREEN}
+COLORS = {"opengl": BLUE, "pyrender": VERMILION, "raycast": GREEN}
 MARKERS = {1: "o", 2: "s", 3: "^", 4: "D"}
 TEXTURES, FACES = "smaller textures", "fewer triangles"
-DETAIL_COLOURS = {TEXTURES: ORANGE, FACES: PURPLE}
+DETAIL_COLORS = {TEXTURES: ORANGE, FACES: PURPLE}
 USED = RING | {"markeredgecolor": BLACK}
 
 
@@ -193,22 +193,22 @@ def draw_panel(axes: Axes, rows: pd.DataFrame) -> None:
     full_used = rows[same & (rows["left_out"] == "")].iloc[0]
     for backend, full in rows[rows["left_out"] == ""].groupby("backend", sort=False):
         full = full.sort_values("supersampling", kind="stable")
-        colour = COLOURS[str(backend)]
-        axes.plot(full["ms"], full["error"], color=colour, linewidth=0.9, zorder=2)
+        color = COLORS[str(backend)]
+        axes.plot(full["ms"], full["error"], color=color, linewidth=0.9, zorder=2)
         for row in full.itertuples():
-            _mark(axes, row, colour)
-    for kind, colour in DETAIL_COLOURS.items():
+            _mark(axes, row, color)
+    for kind, color in DETAIL_COLORS.items():
         less = rows[(rows["left_out"] == kind) & (rows["chosen"] == 0)]
         points = [
             (full_used["ms"], full_used["error"]),
             *zip(less["ms"], less["error"], strict=True),
         ]
-        axes.plot(*zip(*points, strict=True), color=colour, linewidth=0.9, linestyle=":", zorder=2)
+        axes.plot(*zip(*points, strict=True), color=color, linewidth=0.9, linestyle=":", zorder=2)
         for row, side in zip(less.itertuples(), ("left", "right"), strict=False):
-            _mark(axes, row, colour, filled=False)
+            _mark(axes, row, color, filled=False)
             _name(axes, row, full_faces, side)
     if _is_less(chosen, full_faces):
-        style = _face(MARKERS[chosen["supersampling"]], COLOURS[chosen["backend"]], filled=False)
+        style = _face(MARKERS[chosen["supersampling"]], COLORS[chosen["backend"]], filled=False)
         axes.plot(*ring, linestyle="", markersize=5, **style)
     axes.plot(*ring, **USED)
     set_log(axes, "x", "y")
@@ -218,8 +218,8 @@ def draw_panel(axes: Axes, rows: pd.DataFrame) -> None:
     axes.set_title(f"{scene_title(chosen['scene'])}, {size}")
 
 
-def _mark(axes: Axes, row: Any, colour: str, filled: bool = True) -> None:
-    style = _face(MARKERS[row.supersampling], colour, filled)
+def _mark(axes: Axes, row: Any, color: str, filled: bool = True) -> None:
+    style = _face(MARKERS[row.supersampling], color, filled)
     axes.plot(row.ms, row.error, linestyle="", markersize=5, **style)
 
 
@@ -242,15 +242,15 @@ def left_out(rows: pd.DataFrame, faces: float) -> pd.Series[str]:
     return found.mask(rows["texture_scale"] != 1.0, TEXTURES)
 
 
-def _face(marker: str, colour: str, filled: bool) -> Style:
-    face = colour if filled else "white"
-    return {"marker": marker, "markeredgecolor": colour, "markerfacecolor": face, "zorder": 3}
+def _face(marker: str, color: str, filled: bool) -> Style:
+    face = color if filled else "white"
+    return {"marker": marker, "markeredgecolor": color, "markerfacecolor": face, "zorder": 3}
 
 
 def _legend(rows: pd.DataFrame) -> list[Line2D]:
-    handles = [Line2D([], [], color=COLOURS[name], label=name) for name in rows["backend"].unique()]
-    for kind, colour in DETAIL_COLOURS.items():
-        handles.append(Line2D([], [], color=colour, linestyle=":", label=f"with {kind}"))
+    handles = [Line2D([], [], color=COLORS[name], label=name) for name in rows["backend"].unique()]
+    for kind, color in DETAIL_COLORS.items():
+        handles.append(Line2D([], [], color=color, linestyle=":", label=f"with {kind}"))
     for samples in sorted(rows["supersampling"].unique()):
         label = f"{samples:.0f} × {samples:.0f} samples"
         style = _face(MARKERS[samples], "0.4", True)

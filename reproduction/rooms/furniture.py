@@ -7,16 +7,16 @@ from functools import partial
 import numpy as np
 
 from synfeal.objects import materials
-from synfeal.objects.canvas import VIVID, Colour, Painter, pick, shade
+from synfeal.objects.canvas import VIVID, Color, Painter, pick, shade
 from synfeal.objects.materials import painted
 from synfeal.objects.patches import Item, Maker, joined, upright
 
 Size = tuple[float, float, float]  # metres along x, y and z
-METAL: Colour = (0.55, 0.56, 0.58)
+METAL: Color = (0.55, 0.56, 0.58)
 DARK = painted((0.13, 0.13, 0.15))
 
 
-def table(make: Maker, size_m: Size, top: Painter, leg: Colour = METAL) -> Item:
+def table(make: Maker, size_m: Size, top: Painter, leg: Color = METAL) -> Item:
     """Build a table: a 4 cm top on four square legs."""
     width, depth, height = size_m
     board = make.box((width, depth, 0.04), top, 220).placed(0, 0, height - 0.04)
@@ -38,9 +38,9 @@ def monitor(make: Maker) -> Item:
     return joined(panel.placed(0, 0, 0.14), shown.placed(0, 0, 0.14), neck, foot)
 
 
-def chair(make: Maker, colour: Colour) -> Item:
+def chair(make: Maker, color: Color) -> Item:
     """Build an office chair, 0.95 m high."""
-    cloth = materials.fabric(colour)
+    cloth = materials.fabric(color)
     foot = partial(make.box, (0.32, 0.05, 0.05), DARK, 40, "fblrt")
     turns = range(0, 360, 72)
     return joined(
@@ -51,18 +51,18 @@ def chair(make: Maker, colour: Colour) -> Item:
     )
 
 
-def cabinet(make: Maker, size_m: Size, colour: Colour, doors: int = 2, rows: int = 1) -> Item:
+def cabinet(make: Maker, size_m: Size, color: Color, doors: int = 2, rows: int = 1) -> Item:
     """Build a closed cupboard with doors or drawers in its front.
 
     Args:
         make: Maker of shapes.
         size_m: Width, depth and height, metres.
-        colour: Colour of the front; the sides are a little darker.
+        color: Colour of the front; the sides are a little darker.
         doors: Doors, or columns of drawers, side by side.
         rows: Rows of them, one above another.
     """
-    front = materials.cabinet_front(colour, doors=doors, rows=rows)
-    return make.box(size_m, painted(shade(colour, 0.85), 0.08), 150, "flrt", front=front)
+    front = materials.cabinet_front(color, doors=doors, rows=rows)
+    return make.box(size_m, painted(shade(color, 0.85), 0.08), 150, "flrt", front=front)
 
 
 def bookshelf(make: Maker, size_m: Size, rows: int = 5) -> Item:
@@ -133,10 +133,10 @@ def sofa(make: Maker, width_m: float, painter: Painter) -> Item:
     )
 
 
-BOTTLES: tuple[Colour, ...] = (
+BOTTLES: tuple[Color, ...] = (
     (0.35, 0.2, 0.08), (0.75, 0.78, 0.8), (0.2, 0.4, 0.25), (0.85, 0.85, 0.8), (0.2, 0.3, 0.6),
 )  # fmt: skip
-LEAVES: tuple[Colour, ...] = ((0.16, 0.4, 0.12), (0.25, 0.5, 0.15), (0.4, 0.55, 0.2))
+LEAVES: tuple[Color, ...] = ((0.16, 0.4, 0.12), (0.25, 0.5, 0.15), (0.4, 0.55, 0.2))
 PAGES_M = ((0.21, 0.297), (0.297, 0.21), (0.297, 0.42))  # width and height
 MUG_M = [(0.03, 0.1), (0.042, 0.1), (0.04, 0.0)]
 
@@ -158,12 +158,12 @@ def on_table(make: Maker, width_m: float, depth_m: float) -> Item:
         things.append(page.placed(x, y, 0.003, rng.uniform(0, 360)))
     for _ in range(3):
         x, y = rng.uniform((-0.45, 0.05), (0.45, 0.4)) * scale
-        colour = pick(rng, VIVID)
+        color = pick(rng, VIVID)
         if rng.random() < 0.5:
-            things.append(make.turned(MUG_M, painted(colour), 150, 10).placed(x, y, 0.001))
+            things.append(make.turned(MUG_M, painted(color), 150, 10).placed(x, y, 0.001))
         else:
             size = (rng.uniform(0.12, 0.25), rng.uniform(0.08, 0.16), rng.uniform(0.06, 0.18))
-            carton = make.box(size, materials.label(colour), 300, "fblrt")
+            carton = make.box(size, materials.label(color), 300, "fblrt")
             things.append(carton.placed(x, y, 0.001, rng.uniform(-30, 30)))
     return joined(things)
 
@@ -222,7 +222,7 @@ def pinned_page(make: Maker) -> Item:
     return make.sheet(np.stack(sides, axis=1), materials.page(), 320)
 
 
-def coat(make: Maker, colour: Colour) -> Item:
+def coat(make: Maker, color: Color) -> Item:
     """Build a coat on a hook: a folded sheet in front of a wall at y = 0, the hook at z = 0."""
     rng = make.rng
     down, across = np.meshgrid(np.linspace(0, 1, 19), np.linspace(-1, 1, 15), indexing="ij")
@@ -230,10 +230,10 @@ def coat(make: Maker, colour: Colour) -> Item:
     folds = np.sin(across * rng.uniform(7, 10) + rng.uniform(0, 6) + 1.5 * down)
     y = -0.05 - (0.12 * np.sqrt(down) + 0.03 * folds * down) * (1 - 0.85 * across**4)
     points = np.stack([half * across, y, -0.95 * down - 0.04 * across**2], axis=-1)
-    return make.sheet(points, materials.fabric(colour), 130)
+    return make.sheet(points, materials.fabric(color), 130)
 
 
-def plant(make: Maker, height_m: float, pot: Colour, leaves: int = 40) -> Item:
+def plant(make: Maker, height_m: float, pot: Color, leaves: int = 40) -> Item:
     """Build a pot plant: bent leaves around a stem.
 
     Args:

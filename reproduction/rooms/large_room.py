@@ -16,7 +16,7 @@ from reproduction.rooms import furniture, pictures
 from reproduction.rooms.lighting import Lamp, Lighting, Sun, ambient_corners
 from reproduction.rooms.scan import Scanner, stations
 from synfeal.objects import materials
-from synfeal.objects.canvas import Canvas, Colour, Pixels, mix
+from synfeal.objects.canvas import Canvas, Color, Pixels, mix
 from synfeal.objects.materials import painted
 from synfeal.objects.patches import Item, Maker, joined, level, upright
 from synfeal.records.provenance import generator_of
@@ -32,7 +32,7 @@ WINDOW_M, SILL_M = (1.5, 1.25), 0.95
 LAMPS_M = tuple((x, y) for x in (1.4, 3.6) for y in (1.2, 3.3, 5.4))
 LAMP_STRENGTHS = (0.9, 0.5, 0.95, 0.8, 0.05, 0.7)  # the fifth is off
 
-WHITE: Colour = (0.9, 0.9, 0.88)
+WHITE: Color = (0.9, 0.9, 0.88)
 BEECH = materials.wood((0.8, 0.68, 0.5), contrast=0.08)
 OAK = materials.wood((0.72, 0.55, 0.36))
 CONCRETE = materials.plaster((0.5, 0.5, 0.48), grain=0.06)
@@ -110,8 +110,8 @@ def _shell(make: Maker) -> Item:
     wall = partial(materials.wainscot, grain=0.003, stains=0.006)
     return joined(
         *(
-            make.sheet(upright(start, end, 0, z), wall(colour, lower), 125)
-            for start, end, colour, lower in WALLS
+            make.sheet(upright(start, end, 0, z), wall(color, lower), 125)
+            for start, end, color, lower in WALLS
         ),
         make.sheet(level((0, x), (0, y), 0), _floor, 180),
         make.sheet(level((0, x), (0, y), z, face_down=True), _ceiling, 100),
@@ -226,9 +226,9 @@ def _fittings(make: Maker) -> Item:
     y, z = LENGTH_M, HEIGHT_M
     tray = make.box((0.2, y, 0.08), painted((0.3, 0.32, 0.35)), 60, "lru")
     cables = []
-    for at, colour in CABLES:
+    for at, color in CABLES:
         sag = [(0.55, at, z - 0.28), (0.3, at + 0.04, 2.3), (0.04, at, 1.9), (0.04, at, 0.75)]
-        cables.append(make.tube(sag, 0.015, painted(colour), 60, 5))
+        cables.append(make.tube(sag, 0.015, painted(color), 60, 5))
     pipe = [(4.7, at, z - 0.2) for at in (0, y / 2, y)]
     return joined(
         make.tube(pipe, 0.07, painted((0.75, 0.15, 0.1)), 80, 10),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from reproduction.rooms.scan import Surface
 from synfeal.mesh.rays import RayCaster
-from synfeal.objects.canvas import Colour
+from synfeal.objects.canvas import Color
 
 Vectors = NDArray[np.float32]
 LIFT_M = 0.015  # rays start this far in front of their surface
@@ -32,7 +32,7 @@ class Lamp:
 
     position_m: tuple[float, float, float]
     axis: tuple[float, float, float]
-    colour: Colour
+    color: Color
     group: Literal["lamps", "daylight"] = "lamps"
 
 
@@ -44,7 +44,7 @@ class Sun:
     """
 
     direction: tuple[float, float, float]
-    colour: Colour
+    color: Color
     openings: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...]
 
 
@@ -185,7 +185,7 @@ def _lamp_light(lamp: Lamp, origins: Vectors, normals: Vectors, caster: RayCaste
     # A lamp hangs in or behind the panel that stands for it, so the last stretch does not count.
     visible = caster.sees(origins[reached], origins[reached] + 0.94 * towards[reached])
     light = np.zeros((len(origins), 3), np.float32)
-    light[reached] = (strength[reached] * visible)[:, None] * _single(lamp.colour)
+    light[reached] = (strength[reached] * visible)[:, None] * _single(lamp.color)
     return light
 
 
@@ -204,12 +204,12 @@ def _sun_light(sun: Sun, origins: Vectors, normals: Vectors, caster: RayCaster) 
         # The window itself is a surface of the mesh; what is in front of it blocks the light.
         reach = np.maximum(travel[lit] - 0.12, 0)[:, None]
         visible = caster.sees(origins[lit], origins[lit] + reach * towards)
-        light[lit] += (strength[lit] * visible)[:, None] * _single(sun.colour)
+        light[lit] += (strength[lit] * visible)[:, None] * _single(sun.color)
     return light
 
 
 def ambient_corners(
-    near_left: Colour, far_left: Colour, near_right: Colour, far_right: Colour, top: float
+    near_left: Color, far_left: Color, near_right: Color, far_right: Color, top: float
 ) -> NDArray[np.float32]:
     """Compute the ambient light at the corners of a room from that at the corners of its floor.
 

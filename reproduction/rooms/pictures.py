@@ -12,7 +12,7 @@ from synfeal.objects.canvas import (
     INK,
     VIVID,
     Canvas,
-    Colour,
+    Color,
     Pixels,
     Sketch,
     bordered,
@@ -25,27 +25,27 @@ from synfeal.objects.canvas import (
 )
 from synfeal.objects.materials import plaster
 
-FACADES: tuple[Colour, ...] = ((0.7, 0.5, 0.4), (0.75, 0.72, 0.65), (0.5, 0.55, 0.6))
+FACADES: tuple[Color, ...] = ((0.7, 0.5, 0.4), (0.75, 0.72, 0.65), (0.5, 0.55, 0.6))
 
 
 @painter
-def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
+def poster(canvas: Canvas, ground: Color | None = None) -> Pixels:
     """Paint a poster nobody else has: ramp, coloured shapes, rows of type, a white border."""
     rng = canvas.rng
     base = ground or pick(rng, VIVID)
     sketch = Sketch(ramp(canvas, base, shade(pick(rng, VIVID), 1.3), rng.uniform(0, 2 * np.pi)))
     for _ in range(int(rng.integers(10, 18))):
         x, y = rng.uniform(0.1, 0.9), rng.uniform(0.1, 0.7)
-        colour = shade(pick(rng, VIVID), rng.uniform(0.7, 1.5))
+        color = shade(pick(rng, VIVID), rng.uniform(0.7, 1.5))
         if rng.random() < 0.4:
             radius = rng.uniform(0.03, 0.15)
-            sketch.ellipse(x, y, radius, radius * canvas.width_px / canvas.height_px, colour)
+            sketch.ellipse(x, y, radius, radius * canvas.width_px / canvas.height_px, color)
         else:
             radius, n = rng.uniform(0.08, 0.25), int(rng.integers(3, 9))
             angle = np.sort(rng.uniform(0, 2 * np.pi, n))
             reach = radius * rng.uniform(0.5, 1.0, n)
             blob = x + reach * np.cos(angle), y + reach * np.sin(angle)
-            sketch.polygon(np.stack(blob, axis=1), colour)
+            sketch.polygon(np.stack(blob, axis=1), color)
     sketch.rectangle(0.08, 0.74, 0.92, 0.95, (0.95, 0.95, 0.92))
     sketch.text_lines(rng, (0.1, 0.76, 0.9, 0.82), 1, pick(rng, INK))
     sketch.text_lines(rng, (0.1, 0.84, 0.9, 0.94), 4, (0.2, 0.2, 0.2))
@@ -54,7 +54,7 @@ def poster(canvas: Canvas, ground: Colour | None = None) -> Pixels:
 
 @painter
 def painting(
-    canvas: Canvas, palette: tuple[Colour, ...] = VIVID, frame: Colour = (0.45, 0.3, 0.1)
+    canvas: Canvas, palette: tuple[Color, ...] = VIVID, frame: Color = (0.45, 0.3, 0.1)
 ) -> Pixels:
     """Paint an abstract landscape in a frame: noise layers as sky and hills, dabs of paint.
 
@@ -99,7 +99,7 @@ def whiteboard(canvas: Canvas) -> Pixels:
 
 
 @painter
-def noticeboard(canvas: Canvas, ground: Colour = (0.62, 0.45, 0.27)) -> Pixels:
+def noticeboard(canvas: Canvas, ground: Color = (0.62, 0.45, 0.27)) -> Pixels:
     """Paint cork with overlapping sheets of paper."""
     rng = canvas.rng
     sketch = Sketch(plaster(ground, 0.1, 0.12)(canvas))
@@ -129,7 +129,7 @@ def window_view(canvas: Canvas, panes: tuple[int, int] = (2, 2), blind: float = 
     _skyline(sketch, rng)
     for y in np.arange(0, blind, 0.03):
         sketch.rectangle(0, y, 1, y + 0.024, (0.85, 0.82, 0.74))
-    bar: Colour = (0.9, 0.9, 0.9)
+    bar: Color = (0.9, 0.9, 0.9)
     for x in np.linspace(0, 1, panes[0] + 1):
         sketch.rectangle(x - 0.02, 0, x + 0.02, 1, bar)
     for y in np.linspace(0, 1, panes[1] + 1):
@@ -141,18 +141,18 @@ def _skyline(sketch: Sketch, rng: np.random.Generator) -> None:
     for _ in range(5):
         x, top = rng.uniform((0, 0.4), (0.9, 0.75))
         wide = rng.uniform(0.12, 0.3)
-        colour = shade(pick(rng, FACADES), rng.uniform(0.7, 1.2))
-        sketch.rectangle(x, top, x + wide, 1, colour)
+        color = shade(pick(rng, FACADES), rng.uniform(0.7, 1.2))
+        sketch.rectangle(x, top, x + wide, 1, color)
         for cx in np.arange(x + 0.02, x + wide - 0.02, 0.05):
             for cy in np.arange(top + 0.03, 0.95, 0.07):
-                sketch.rectangle(cx, cy, cx + 0.02, cy + 0.035, shade(colour, 0.45))
+                sketch.rectangle(cx, cy, cx + 0.02, cy + 0.035, shade(color, 0.45))
     for _ in range(26):
         x, y = rng.uniform((0, 0.78), (1, 1))
         sketch.ellipse(x, y, 0.07, 0.07, shade((0.25, 0.45, 0.18), rng.uniform(0.5, 1.3)))
 
 
 @painter
-def stained_glass(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, cells: int = 160) -> Pixels:
+def stained_glass(canvas: Canvas, palette: tuple[Color, ...] = VIVID, cells: int = 160) -> Pixels:
     """Paint glass cells in lead: a Voronoi diagram of random points.
 
     Args:
@@ -166,22 +166,22 @@ def stained_glass(canvas: Canvas, palette: tuple[Colour, ...] = VIVID, cells: in
     grid = np.stack(np.broadcast_arrays(x, y), axis=-1)
     distance, nearest = cKDTree(seeds).query(grid, k=2)
     brightness = rng.uniform(0.8, 1.5, (cells, 1))
-    colours = np.asarray(palette)[rng.integers(len(palette), size=cells)] * brightness
-    image: Pixels = np.clip(colours, 0, 1)[nearest[..., 0]].astype(np.float32)
+    colors = np.asarray(palette)[rng.integers(len(palette), size=cells)] * brightness
+    image: Pixels = np.clip(colors, 0, 1)[nearest[..., 0]].astype(np.float32)
     image[distance[..., 1] - distance[..., 0] < 0.012] = 0.05
     return image
 
 
-ROBES: tuple[Colour, ...] = (
+ROBES: tuple[Color, ...] = (
     (0.7, 0.15, 0.12), (0.15, 0.25, 0.6), (0.2, 0.45, 0.25), (0.75, 0.5, 0.15),
     (0.5, 0.2, 0.4), (0.85, 0.8, 0.7), (0.35, 0.2, 0.12),
 )  # fmt: skip
-GOLD: Colour = (0.9, 0.72, 0.3)
-SKIN: Colour = (0.85, 0.65, 0.5)
+GOLD: Color = (0.9, 0.72, 0.3)
+SKIN: Color = (0.85, 0.65, 0.5)
 
 
 @painter
-def mural(canvas: Canvas, ground: Colour, sky: Colour, figures: int = 5) -> Pixels:
+def mural(canvas: Canvas, ground: Color, sky: Color, figures: int = 5) -> Pixels:
     """Paint saints before a landscape, framed by a painted border.
 
     Args:
@@ -226,7 +226,7 @@ def _saint(sketch: Sketch, rng: np.random.Generator, x: float, top: float, canva
     sketch.line([(staff, top), (staff, foot)], GOLD, 0.008)
 
 
-def _border(sketch: Sketch, rng: np.random.Generator, colour: Colour, canvas: Canvas) -> None:
+def _border(sketch: Sketch, rng: np.random.Generator, color: Color, canvas: Canvas) -> None:
     edge_x, edge_y = (0.1 / side for side in canvas.size_m)
     for x0, y0, x1, y1 in (
         (0, 0, 1, edge_y),
@@ -234,7 +234,7 @@ def _border(sketch: Sketch, rng: np.random.Generator, colour: Colour, canvas: Ca
         (0, 0, edge_x, 1),
         (1 - edge_x, 0, 1, 1),
     ):
-        sketch.rectangle(x0, y0, x1, y1, colour)
+        sketch.rectangle(x0, y0, x1, y1, color)
     for x in np.arange(edge_x, 1 - edge_x, 1.5 * edge_x):
         for y in (edge_y / 2, 1 - edge_y / 2):
             sketch.ellipse(x, y, 0.4 * edge_x, 0.4 * edge_y, shade(pick(rng, ROBES), 1.3))
@@ -244,7 +244,7 @@ def _border(sketch: Sketch, rng: np.random.Generator, colour: Colour, canvas: Ca
 
 
 @painter
-def starry_vault(canvas: Canvas, first: Colour, second: Colour) -> Pixels:
+def starry_vault(canvas: Canvas, first: Color, second: Color) -> Pixels:
     """Paint a vault from ``first`` to ``second`` along x, with golden stars and medallions."""
     rng = canvas.rng
     x, _ = canvas.coordinates_m()
@@ -266,9 +266,9 @@ def starry_vault(canvas: Canvas, first: Colour, second: Colour) -> Pixels:
 def _medallion(sketch: Sketch, rng: np.random.Generator, x: float, y: float, aspect: float) -> None:
     radius = rng.uniform(0.045, 0.075)
     inner, middle = pick(rng, ROBES), shade(pick(rng, ROBES), 1.4)
-    for scale, colour in ((1.0, GOLD), (0.85, inner), (0.7, middle)):
-        sketch.ellipse(x, y, scale * radius / aspect, scale * radius, colour)
+    for scale, color in ((1.0, GOLD), (0.85, inner), (0.7, middle)):
+        sketch.ellipse(x, y, scale * radius / aspect, scale * radius, color)
     for _ in range(7):
         (dx, dy), wide = rng.uniform(-0.4, 0.4, 2) * radius, 0.18 * radius / aspect
-        colour = shade(pick(rng, ROBES), 1.2)
-        sketch.ellipse(x + dx / aspect, y + dy, wide, 0.2 * radius, colour)
+        color = shade(pick(rng, ROBES), 1.2)
+        sketch.ellipse(x + dx / aspect, y + dy, wide, 0.2 * radius, color)

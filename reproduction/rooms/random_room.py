@@ -15,7 +15,7 @@ from reproduction.rooms import furniture, pictures
 from reproduction.rooms.lighting import Lamp, Lighting, ambient_corners
 from reproduction.rooms.scan import Scanner, stations
 from synfeal.objects import materials
-from synfeal.objects.canvas import Colour, Painter
+from synfeal.objects.canvas import Color, Painter
 from synfeal.objects.patches import Item, Maker, joined, level, upright
 from synfeal.records.provenance import generator_of
 
@@ -68,28 +68,28 @@ def _walls(x_m: float, y_m: float) -> tuple[Wall, ...]:
     )
 
 
-def _colour(rng: Generator, least: float = 0.25, most: float = 0.95) -> Colour:
+def _color(rng: Generator, least: float = 0.25, most: float = 0.95) -> Color:
     # Mostly pale, sometimes vivid, as rooms are.
     return colorsys.hsv_to_rgb(rng.random(), 0.85 * rng.random() ** 2, rng.uniform(least, most))
 
 
-def _palette(rng: Generator, count: int) -> tuple[Colour, ...]:
-    return tuple(_colour(rng) for _ in range(count))
+def _palette(rng: Generator, count: int) -> tuple[Color, ...]:
+    return tuple(_color(rng) for _ in range(count))
 
 
 def _surface(rng: Generator) -> Painter:
     """Draw the material of a wall, a floor or a ceiling."""
-    palette, colour, other = _palette(rng, int(rng.integers(1, 5))), _colour(rng), _colour(rng)
+    palette, color, other = _palette(rng, int(rng.integers(1, 5))), _color(rng), _color(rng)
     blocks = (rng.uniform(0.1, 0.9), rng.uniform(0.06, 0.3))
-    masonry = materials.masonry(palette, block_m=blocks, joint=_colour(rng))
+    masonry = materials.masonry(palette, block_m=blocks, joint=_color(rng))
     choices: list[Painter] = [
         masonry,
         masonry,
-        materials.plaster(colour),
-        materials.damask(colour, motif=other, pitch_m=rng.uniform(0.15, 0.5)),
-        materials.wood(colour, contrast=rng.uniform(0.1, 0.3)),
-        materials.marble(colour, vein=other, scale_m=rng.uniform(0.2, 0.8)),
-        materials.wainscot(colour, lower=other, height_m=rng.uniform(0.5, 1.4)),
+        materials.plaster(color),
+        materials.damask(color, motif=other, pitch_m=rng.uniform(0.15, 0.5)),
+        materials.wood(color, contrast=rng.uniform(0.1, 0.3)),
+        materials.marble(color, vein=other, scale_m=rng.uniform(0.2, 0.8)),
+        materials.wainscot(color, lower=other, height_m=rng.uniform(0.5, 1.4)),
     ]
     return choices[int(rng.integers(len(choices)))]
 
@@ -130,14 +130,14 @@ def _along(make: Maker, wall: Wall, high_m: float) -> list[Item]:
 
 def _picture(rng: Generator) -> Painter:
     choices: list[Painter] = [
-        pictures.painting(_palette(rng, 4), frame=_colour(rng)),
+        pictures.painting(_palette(rng, 4), frame=_color(rng)),
         pictures.poster(),
         pictures.whiteboard(),
-        pictures.noticeboard(_colour(rng)),
+        pictures.noticeboard(_color(rng)),
         pictures.window_view(panes=(int(rng.integers(1, 4)), int(rng.integers(1, 4)))),
         pictures.stained_glass(_palette(rng, 5), cells=60),
-        pictures.mural(_colour(rng), sky=_colour(rng), figures=3),
-        materials.door(_colour(rng), window=bool(rng.random() < 0.5)),
+        pictures.mural(_color(rng), sky=_color(rng), figures=3),
+        materials.door(_color(rng), window=bool(rng.random() < 0.5)),
         materials.screen(),
         materials.rug(_palette(rng, 4)),
     ]
@@ -148,19 +148,19 @@ def _standing(make: Maker, wide_m: float) -> tuple[Item, float, float]:
     """Build something with its back to a wall; also return its depth and its height."""
     rng = make.rng
     deep, tall = rng.uniform(0.3, 0.6), rng.uniform(0.5, 2.1)
-    cloth = materials.fabric(_colour(rng), stripe=_colour(rng))
+    cloth = materials.fabric(_color(rng), stripe=_color(rng))
     doors, rows = int(rng.integers(1, 4)), int(rng.integers(1, 4))
     match int(rng.integers(4)):
         case 0:
             size = (wide_m, deep, tall)
-            return furniture.cabinet(make, size, _colour(rng), doors, rows), deep, tall
+            return furniture.cabinet(make, size, _color(rng), doors, rows), deep, tall
         case 1:
             shelves = max(2, round(tall / 0.4))
             return furniture.bookshelf(make, (wide_m, 0.3, tall), shelves), 0.3, tall
         case 2:
             return furniture.sofa(make, max(wide_m, 1.0), cloth), 0.8, 0.8
         case _:
-            return furniture.plant(make, min(tall, 1.4), _colour(rng), 30), 0.5, 1.4
+            return furniture.plant(make, min(tall, 1.4), _color(rng), 30), 0.5, 1.4
 
 
 def _free_standing(make: Maker, size: Size) -> Item:
@@ -170,12 +170,12 @@ def _free_standing(make: Maker, size: Size) -> Item:
         x, y = rng.uniform((1.1, 1.1), (size[0] - 1.1, size[1] - 1.1))
         yaw, tall = rng.uniform(0, 360), rng.uniform(0.4, 0.78)
         wide, deep = rng.uniform(0.7, 1.5), rng.uniform(0.6, 0.9)
-        top = materials.wood(_colour(rng), contrast=0.18)
-        table = furniture.table(make, (wide, deep, tall), top, _colour(rng))
+        top = materials.wood(_color(rng), contrast=0.18)
+        table = furniture.table(make, (wide, deep, tall), top, _color(rng))
         stuff = furniture.on_table(make, wide, deep).placed(0, 0, tall)
         seats = []
         for _ in range(int(rng.integers(0, 3))):
-            seat = furniture.chair(make, _colour(rng))
+            seat = furniture.chair(make, _color(rng))
             at_x, at_y, turn = rng.uniform((-0.9, -0.9, 0), (0.9, 0.9, 360))
             seats.append(seat.placed(at_x, at_y, 0, turn))
         things.append(joined(table, stuff, seats).placed(x, y, 0, yaw))
@@ -191,7 +191,7 @@ def _free_standing(make: Maker, size: Size) -> Item:
 
 
 def _lighting(rng: Generator, size: Size) -> Lighting:
-    def scaled(share: float) -> Colour:
+    def scaled(share: float) -> Color:
         warm = rng.uniform(0.75, 1.25)
         return (share * warm, share, share * (2.0 - warm))
 

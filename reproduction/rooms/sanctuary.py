@@ -14,7 +14,7 @@ from reproduction.rooms import furniture, pictures
 from reproduction.rooms.lighting import Lamp, Lighting, Sun, ambient_corners
 from reproduction.rooms.scan import Scanner, stations
 from synfeal.objects import materials
-from synfeal.objects.canvas import Canvas, Colour, Pixels
+from synfeal.objects.canvas import Canvas, Color, Pixels
 from synfeal.objects.materials import painted
 from synfeal.objects.patches import Item, Maker, Points, joined, level, upright
 from synfeal.records.provenance import generator_of
@@ -81,7 +81,7 @@ PANELS = tuple(
         (0.0, 3.3, (0.9, 0.55), (0.7, 0.5, 0.2), (0.95, 0.85, 0.5), 1),
     )
 )
-STATUES: tuple[tuple[float, float, Colour], ...] = (  # x, y and robe
+STATUES: tuple[tuple[float, float, Color], ...] = (  # x, y and robe
     (-2.3, 3.4, (0.2, 0.3, 0.65)), (2.3, 3.4, (0.65, 0.15, 0.15)), (2.45, -1.4, (0.8, 0.78, 0.7)),
 )  # fmt: skip
 
@@ -256,8 +256,8 @@ def _columns(make: Maker) -> Item:
 def _statues(make: Maker) -> Item:
     """Build robed figures on pedestals, two beside the altar and one at the east wall."""
     things = []
-    for x, y, colour in STATUES:
-        robe = materials.fabric(colour, stripe=pictures.GOLD, pitch_m=0.25)
+    for x, y, color in STATUES:
+        robe = materials.fabric(color, stripe=pictures.GOLD, pitch_m=0.25)
         things.append(make.turned(FIGURE, robe, 170, 16).placed(x, y, 0.8))
         things.append(make.box((0.42, 0.42, 0.8), STONE, 140, "fblrt").placed(x, y))
     return joined(things)

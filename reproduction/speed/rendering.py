@@ -274,14 +274,14 @@ def errors_of(renderer: Renderer, poses: Poses, truth: Truth) -> dict[str, float
         truth: Colours and depth of the same views, by :func:`truth_of`.
 
     Returns:
-        What :func:`colour_errors` and :func:`depth_errors` return, in one mapping.
+        What :func:`color_errors` and :func:`depth_errors` return, in one mapping.
     """
     views = [renderer.render_rgbd(pose) for pose in poses]
     rgb, depth_m = (np.stack(images) for images in zip(*views, strict=True))
-    return colour_errors(rgb, truth[0]) | depth_errors(depth_m, truth[1])
+    return color_errors(rgb, truth[0]) | depth_errors(depth_m, truth[1])
 
 
-def colour_errors(rgb: Rgb, expected: NDArray[np.float32]) -> dict[str, float]:
+def color_errors(rgb: Rgb, expected: NDArray[np.float32]) -> dict[str, float]:
     """Compute the mean absolute difference in levels of 0 to 255, and the PSNR in dB."""
     difference = rgb - expected
     mean_square = float(np.mean(difference**2, dtype=np.float64))

@@ -31,7 +31,7 @@ from synfeal.camera.projection import pixels_per_radian
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.render_sequence import resolved
-from synfeal.mesh.atlas import texel_size_m, with_baked_colours
+from synfeal.mesh.atlas import texel_size_m, with_baked_colors
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
@@ -87,7 +87,7 @@ class Detail:
             "faces": self.chosen.mesh.n_faces,
             "full_faces": self.full.mesh.n_faces,
             "texture_scale": 1.0 / self.chosen.texture_factor,
-            "baked_vertex_colours": self.chosen.is_baked,
+            "baked_vertex_colors": self.chosen.is_baked,
             "error_levels": round(self.chosen.error_levels, 3),
             "full_error_levels": round(self.full.error_levels, 3),
             "supersampling": render.supersampling,
@@ -181,15 +181,15 @@ def _fewer_faces(mesh: TexturedMesh, textured: Level, judge: _Judge) -> Iterator
 
 def _baked(mesh: TexturedMesh, textured: Level, judge: _Judge) -> Iterator[Level]:
     """Yield the same with vertex colours baked into textures; nothing without vertex colours."""
-    if not any(_has_colours_alone(part) for part in mesh.parts):
+    if not any(_has_colors_alone(part) for part in mesh.parts):
         return
     for factor in BAKED_FACTORS:
         reduced = with_fewer_faces(textured.mesh, mesh.n_faces // factor)
         if len(reduced.parts) < len(mesh.parts):
             return  # some part is gone, and which is which is not known
         parts = (
-            with_baked_colours(less, part, BAKED_TEXEL * texel_size_m(part))
-            if _has_colours_alone(part)
+            with_baked_colors(less, part, BAKED_TEXEL * texel_size_m(part))
+            if _has_colors_alone(part)
             else less
             for less, part in zip(reduced.parts, mesh.parts, strict=True)
         )
@@ -197,7 +197,7 @@ def _baked(mesh: TexturedMesh, textured: Level, judge: _Judge) -> Iterator[Level
         yield replace(judge.level(baked, textured.texture_factor), is_baked=True)
 
 
-def _has_colours_alone(part: MeshPart) -> bool:
+def _has_colors_alone(part: MeshPart) -> bool:
     return part.vertex_rgb is not None and part.texture is None
 
 

@@ -17,7 +17,7 @@ from synfeal.config.load import check_mesh_file
 from synfeal.effects.files import CARTONS, carton_files
 from synfeal.errors import InputError
 from synfeal.mesh.ambient import with_ambient_light
-from synfeal.mesh.checks import refuse_colourless
+from synfeal.mesh.checks import refuse_colorless
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties
@@ -95,7 +95,7 @@ def prepare_mesh(
     """
     mesh = build_or_load(scene, seed, name)
     if shade is None:
-        refuse_colourless(mesh, f"scenes.{name}.path: {scene.path}")
+        refuse_colorless(mesh, f"scenes.{name}.path: {scene.path}")
     box = sampling_box_of(scene, mesh.bounds_m, f"scenes.{name}")
     curve: list[Rung] = []
     if collision_agreement is None:

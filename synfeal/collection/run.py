@@ -34,7 +34,7 @@ from synfeal.dataset.world import read_scan_record, rigid_motion_of, write_seque
 from synfeal.effects.scene import crowd_of
 from synfeal.errors import InputError
 from synfeal.geometry.poses import moved_right
-from synfeal.mesh.checks import shows_one_colour
+from synfeal.mesh.checks import shows_one_color
 from synfeal.mesh.load import is_y_up
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
@@ -63,7 +63,7 @@ def refuse_invisible(
         name: What messages call the mesh.
         shade: Light that shows its shape; a mesh of one colour is refused only without.
     """
-    if shade is None and shows_one_colour(mesh):
+    if shade is None and shows_one_color(mesh):
         raise InputError(
             f"{name}: is of one colour, and so would be every image; put its texture files (of an"
             " OBJ also the .mtl) where it names them, export it with its texture, or set"

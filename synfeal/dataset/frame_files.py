@@ -212,8 +212,8 @@ def encode_png(pixels: Pixels) -> bytes:
     if not is_rgb and not (pixels.ndim == 2 and pixels.dtype == np.uint16):
         raise ValueError(f"cannot encode pixels {pixels.shape} {pixels.dtype} as PNG")
     height, width = pixels.shape[:2]
-    colours = RGB if is_rgb else GREY
-    header = struct.pack(">IIBBBBB", width, height, 8 * pixels.itemsize, colours, 0, 0, 0)
+    colors = RGB if is_rgb else GREY
+    header = struct.pack(">IIBBBBB", width, height, 8 * pixels.itemsize, colors, 0, 0, 0)
     data = deflate.zlib_compress(_filtered(pixels), LEVEL)
     chunks = _chunk(b"IHDR", header), _chunk(b"IDAT", data), _chunk(b"IEND", b"")
     return SIGNATURE + b"".join(chunks)
@@ -246,8 +246,8 @@ def decode_png(content: bytes) -> Pixels | None:
     """
     if len(content) < _START + 8 or not content.startswith(SIGNATURE):
         return None
-    width, height, bits, colours, *others = _HEADER.unpack_from(content, len(SIGNATURE) + 8)
-    kind = {(8, RGB): (3, np.uint8), (16, GREY): (1, np.uint16)}.get((bits, colours))
+    width, height, bits, colors, *others = _HEADER.unpack_from(content, len(SIGNATURE) + 8)
+    kind = {(8, RGB): (3, np.uint8), (16, GREY): (1, np.uint16)}.get((bits, colors))
     if kind is None or any(others) or width * height > MOST_PIXELS:
         return None
     header = content[len(SIGNATURE) + 8 : _START - 4]

@@ -30,8 +30,8 @@ def mask_picture(ids: NDArray[np.integer]) -> Image.Image:
         colorsys.hsv_to_rgb(number * GOLDEN_RATIO % 1.0, 0.65, 0.95) if number else (0.0, 0.0, 0.0)
         for number in numbers.tolist()
     ]
-    colours = (255.0 * np.array(palette)).astype(np.uint8)
-    return Image.fromarray(colours[index.reshape(ids.shape)])
+    colors = (255.0 * np.array(palette)).astype(np.uint8)
+    return Image.fromarray(colors[index.reshape(ids.shape)])
 
 
 def _image(file: FrameFile) -> Image.Image:

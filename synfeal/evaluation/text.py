@@ -128,7 +128,7 @@ def _cell(metrics: Metrics, key: str, text: str, factor: float) -> str:
     return f"{shown} ({'–'.join(ends)})"
 
 
-COLOURS, DASHES = ("#0072B2", "#D55E00"), ("-", "--")
+COLORS, DASHES = ("#0072B2", "#D55E00"), ("-", "--")
 LEAST = 1e-6  # where an error of nothing is drawn on a logarithmic axis
 
 
@@ -141,11 +141,11 @@ def figure_of(title: str, found: Evaluation) -> Figure:
     figure.suptitle(title, fontsize=10)
     panels = figure.subplots(1, 3, sharey=True)
     labels = ("position error (m)", "orientation error (°)", "both errors: below x cm and x°")
-    for end, colour, dash in zip(found.ends, COLOURS, DASHES, strict=False):
+    for end, color, dash in zip(found.ends, COLORS, DASHES, strict=False):
         shown = found.errors[POSITION + end], found.errors[ORIENTATION + end]
         for axes, values in zip(panels, (*shown, joint_error(found.errors, end)), strict=True):
             error, percent = cumulative(np.maximum(values, LEAST))
-            axes.step(error, percent, dash, where="post", color=colour, label=TITLES[end])
+            axes.step(error, percent, dash, where="post", color=color, label=TITLES[end])
     for axes, label in zip(panels, labels, strict=True):
         axes.set(xscale="log", ylim=(0, 101), xlabel=label)
         axes.axhline(50, color="0.85", linewidth=0.8, zorder=0)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from synfeal.config.collection import SceneConfig
 from synfeal.inspect.freespace import FreeSpace, survey, viewpoint
-from synfeal.inspect.suggest import MAX_OF_ONE_COLOUR, MAX_PLAIN, Suggestion, suggest
-from synfeal.inspect.surface import SurfacePoints, area_by_colour, triangle_areas_m2
-from synfeal.mesh.checks import shows_one_colour
+from synfeal.inspect.suggest import MAX_OF_ONE_COLOR, MAX_PLAIN, Suggestion, suggest
+from synfeal.inspect.surface import SurfacePoints, area_by_color, triangle_areas_m2
+from synfeal.mesh.checks import shows_one_color
 from synfeal.mesh.load import is_y_up, load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
@@ -96,14 +96,14 @@ def _that_hold(*doubts: tuple[bool, str]) -> list[str]:
     return [sentence for holds, sentence in doubts if holds]
 
 
-def colour_doubts(mesh: TexturedMesh, area_m2: dict[str, float]) -> list[str]:
+def color_doubts(mesh: TexturedMesh, area_m2: dict[str, float]) -> list[str]:
     """Return doubts that there is anything to see.
 
     Args:
         mesh: World frame.
         area_m2: Its surface by what colours it.
     """
-    plain, of_one = plain_share(area_m2), shows_one_colour(mesh)
+    plain, of_one = plain_share(area_m2), shows_one_color(mesh)
     light = "; the command below lights it (--shade), which shows its shape"
     return _that_hold(
         (
@@ -145,8 +145,8 @@ def suggestion_doubts(suggestion: Suggestion) -> list[str]:
             f" the mesh is open{asked}",
         ),
         (
-            suggestion.one_colour > MAX_OF_ONE_COLOUR,
-            f"{suggestion.one_colour:.0%} of its frames will be of one colour: there is little to"
+            suggestion.one_color > MAX_OF_ONE_COLOR,
+            f"{suggestion.one_color:.0%} of its frames will be of one colour: there is little to"
             " see on these walls",
         ),
     )
@@ -252,8 +252,8 @@ class Inspection:
         surface = SurfacePoints.of(mesh, generator_of(0, "inspect"))
         caster = RayCaster(*mesh.merged())
         found = survey(caster, surface.position_m, box_m)
-        area_m2 = area_by_colour(mesh)
-        plain = 1.0 if shows_one_colour(mesh) else plain_share(area_m2)
+        area_m2 = area_by_color(mesh)
+        plain = 1.0 if shows_one_color(mesh) else plain_share(area_m2)
         space, suggestion = suggest(mesh, caster, found, scene, plain)
         return cls(scene, mesh, tuple(assumed), surface, caster, box_m, space, suggestion)
 

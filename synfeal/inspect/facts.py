@@ -14,14 +14,14 @@ from trimesh.triangles import cross
 import synfeal
 from synfeal.inspect.doubts import (
     Inspection,
-    colour_doubts,
+    color_doubts,
     doubts_of,
     floor_areas_m2,
     suggestion_doubts,
 )
 from synfeal.inspect.freespace import DEFINITION, FreeSpace
 from synfeal.inspect.suggest import COUNTS
-from synfeal.inspect.surface import area_by_colour, colour_of, triangle_areas_m2
+from synfeal.inspect.surface import area_by_color, color_of, triangle_areas_m2
 from synfeal.mesh.gltf import slug_of, title_of
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties, mesh_topology
@@ -49,7 +49,7 @@ def facts_of(found: Inspection) -> dict[str, Any]:
             "frames": COUNTS,
             "covered": suggestion.covered,
             "empty_pixels": asdict(suggestion.empty),
-            "of_one_colour": suggestion.one_colour,
+            "of_one_color": suggestion.one_color,
             "shade": suggestion.shade,
             "min_seen": suggestion.scene.min_seen,
             "min_clearance_m": suggestion.scene.min_clearance_m,
@@ -81,7 +81,7 @@ def facts_of(found: Inspection) -> dict[str, Any]:
         "collect": collect,
         "doubts": [
             *found.assumed,
-            *colour_doubts(mesh, area_m2),
+            *color_doubts(mesh, area_m2),
             *doubts_of(np.ptp(mesh.bounds_m, axis=0), floors_m2, space, found.scene.unit_m),
             *([] if suggestion is None else suggestion_doubts(suggestion)),
         ],
@@ -95,7 +95,7 @@ def _part(part: MeshPart) -> dict[str, Any]:
         "name": part.name,
         "faces": len(part.faces),
         "area_m2": _area_m2([part]),
-        "colour": colour_of(part),
+        "color": color_of(part),
         "texture_px": texture,
         "alpha_cutoff": part.alpha_cutoff,
     }
@@ -105,7 +105,7 @@ def _material_key(part: MeshPart) -> tuple[str, str, bytes, float | None]:
     """Return a key that is equal for parts that are drawn alike."""
     texels = b"" if part.texture is None else part.texture.tobytes()
     texture = hashlib.sha256(texels).hexdigest()
-    return colour_of(part), texture, part.base_color.tobytes(), part.alpha_cutoff
+    return color_of(part), texture, part.base_color.tobytes(), part.alpha_cutoff
 
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -115,21 +115,21 @@ def detail_of(mesh: TexturedMesh) -> dict[str, Any]:
     """Measure surface by what colours it, and the density of texels and of coloured vertices.
 
     ``texels_per_m`` holds the 5 %, 50 % and 95 % quantiles over the textured surface, weighted by
-    area, of the square root of texels per square metre; ``coloured_vertices_per_m`` is the square
+    area, of the square root of texels per square metre; ``colored_vertices_per_m`` is the square
     root of vertices per square metre over all parts coloured by their vertices. None where there
     are no such parts.
     """
     textured, by_vertex = (
-        [part for part in mesh.parts if colour_of(part) == colour]
-        for colour in ("texture", "vertices")
+        [part for part in mesh.parts if color_of(part) == color]
+        for color in ("texture", "vertices")
     )
     vertex_m2, per_m = _area_m2(by_vertex), None
     if vertex_m2 > 0.0:
         per_m = float(np.sqrt(sum(len(np.unique(part.faces)) for part in by_vertex) / vertex_m2))
     return {
-        "area_m2": area_by_colour(mesh),
+        "area_m2": area_by_color(mesh),
         "texels_per_m": texels_per_m(textured),
-        "coloured_vertices_per_m": per_m,
+        "colored_vertices_per_m": per_m,
     }
 
 

@@ -36,7 +36,7 @@ Rgb = NDArray[np.uint8]
 OUTPUTS = ("inspect.json", "inspect.png", "inspect.html")
 N_LEVEL_RAYS = 64
 BOX_RGB = (213, 94, 0)
-BOX_COLOUR = "#{:02x}{:02x}{:02x}".format(*BOX_RGB)
+BOX_COLOR = "#{:02x}{:02x}{:02x}".format(*BOX_RGB)
 SIZE_INCH, DPI = (16.0, 8.8), 100
 LOOKS_ALONG = {0: "+x", 90: "+y", 180: "-x", 270: "-y"}  # by yaw, degrees
 OUTLINE = [withStroke(linewidth=3, foreground="white")]
@@ -148,12 +148,12 @@ def _draw_top(
     axes.set_title(f"From above, cut at z = {cut_m:.2f} m", fontsize=11, loc="left")
     axes.set(xlabel="x (m)", ylabel="y (m)", anchor="N")
     for number, ((x0, y0, z0), (x1, y1, z1)) in enumerate(boxes_m):
-        frame = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=BOX_COLOUR, linewidth=2)
+        frame = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=BOX_COLOR, linewidth=2)
         frame.set_linestyle("--")
         frame.set_path_effects([withStroke(linewidth=4, foreground="white")])
         axes.add_patch(frame)
         text = f"box {number + 1}, z {z0:.2f} to {z1:.2f} m"
-        axes.annotate(text, (x0, y1), (0, 4), va="bottom", fontsize=9, color=BOX_COLOUR, **POINTS)
+        axes.annotate(text, (x0, y1), (0, 4), va="bottom", fontsize=9, color=BOX_COLOR, **POINTS)
     reach = 0.05 * max(top.extent_m[1] - top.extent_m[0], top.extent_m[3] - top.extent_m[2])
     _draw_position(axes, position_m, reach)
     _draw_scale(axes, top)

@@ -30,7 +30,7 @@ from synfeal.planning.coverage import MOSTLY, empty_shares
 from synfeal.planning.plan import box_array, plan_split
 from synfeal.records.provenance import generator_of
 from synfeal.render import open_renderer
-from synfeal.validation.frames import is_of_one_colour
+from synfeal.validation.frames import is_of_one_color
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ TRIAL_FRAMES, TRIAL_TRIES = 30, 300  # to tell whether there are paths in a box
 N_LOOKED_AT = 80  # frames that are drawn
 LOOK_CAMERA = CameraConfig(width=160, height=120)
 MAX_PLAIN = 0.5  # of the surface
-MAX_OF_ONE_COLOUR = 0.02  # of the frames; a data set with a twentieth of them is invalid
+MAX_OF_ONE_COLOR = 0.02  # of the frames; a data set with a twentieth of them is invalid
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Suggestion:
         collection: How the camera moves.
         shade: Light that the frames need, if any.
         empty: What of the images would show nothing.
-        one_colour: Share of the frames that would be of one colour.
+        one_color: Share of the frames that would be of one colour.
         covered: Share of the places for cameras that the boxes hold.
         world_from_cam: Poses (N, 4, 4) of the frames, training and test.
     """
@@ -88,7 +88,7 @@ class Suggestion:
     covered: float
     world_from_cam: Array
     shade: Shade | None = None
-    one_colour: float = 0.0
+    one_color: float = 0.0
 
     @property
     def boxes_m(self) -> Array:
@@ -311,14 +311,14 @@ def lit(mesh: TexturedMesh, suggestion: Suggestion, plain: float) -> Suggestion:
         shades.insert(0, None)
     tried = []
     for shade in shades:
-        share = one_colour_share(mesh, suggestion.world_from_cam, shade)
-        tried.append(replace(suggestion, shade=shade, one_colour=share))
-        if share <= MAX_OF_ONE_COLOUR:
+        share = one_color_share(mesh, suggestion.world_from_cam, shade)
+        tried.append(replace(suggestion, shade=shade, one_color=share))
+        if share <= MAX_OF_ONE_COLOR:
             break
-    return min(tried, key=lambda each: each.one_colour)
+    return min(tried, key=lambda each: each.one_color)
 
 
-def one_colour_share(mesh: TexturedMesh, poses: Array, shade: Shade | None) -> float:
+def one_color_share(mesh: TexturedMesh, poses: Array, shade: Shade | None) -> float:
     """Measure the share of frames that are of one colour, by drawing some of them, small.
 
     Args:
@@ -329,4 +329,4 @@ def one_colour_share(mesh: TexturedMesh, poses: Array, shade: Shade | None) -> f
     shown = with_ambient_light(mesh) if shade == "ambient" else mesh
     index = np.linspace(0, len(poses) - 1, min(N_LOOKED_AT, len(poses))).round().astype(int)
     with open_renderer(shown, LOOK_CAMERA, RenderConfig(shade=shade)) as renderer:
-        return float(np.mean([is_of_one_colour(renderer.render(pose)) for pose in poses[index]]))
+        return float(np.mean([is_of_one_color(renderer.render(pose)) for pose in poses[index]]))

@@ -92,19 +92,19 @@ def nearest_texels(texture: NDArray[np.uint8], uv: Array) -> NDArray[np.uint8]:
     return np.asarray(texture[row, column])
 
 
-def colour_of(part: MeshPart) -> str:
+def color_of(part: MeshPart) -> str:
     """Return what colours a part: ``texture``, ``vertices``, or ``plain`` for one colour."""
     if part.texture is not None:
         return "texture"
     return "plain" if part.vertex_rgb is None else "vertices"
 
 
-def area_by_colour(mesh: TexturedMesh) -> dict[str, float]:
+def area_by_color(mesh: TexturedMesh) -> dict[str, float]:
     """Return the surface in square metres by what colours it."""
-    named = {"texture": "textured", "vertices": "coloured_by_vertex", "plain": "plain"}
+    named = {"texture": "textured", "vertices": "colored_by_vertex", "plain": "plain"}
     area_m2 = dict.fromkeys(named.values(), 0.0)
     for part in mesh.parts:
-        area_m2[named[colour_of(part)]] += float(triangle_areas_m2(part).sum())
+        area_m2[named[color_of(part)]] += float(triangle_areas_m2(part).sum())
     return area_m2
 
 
@@ -140,13 +140,13 @@ class ViewerMesh:
         """
         return {
             "positions": _base64(self.positions, "<i2"),
-            "colours": _base64(self.rgb, "u1"),
+            "colors": _base64(self.rgb, "u1"),
             "faces": _base64(self.faces, "<u4"),
             "offset_m": self.offset_m.tolist(),
             "step_m": self.step_m,
             "yaw": yaw_rad,
             "polylines": [
-                {"points": np.round(np.asarray(points, np.float64), 4).tolist(), "colour": [*rgb]}
+                {"points": np.round(np.asarray(points, np.float64), 4).tolist(), "color": [*rgb]}
                 for points, rgb in polylines
             ],
         }

@@ -59,7 +59,7 @@ def how_to_go_on(facts: Facts) -> str:
     frames, empty = collect["frames"], collect["empty_pixels"]["share"]
     said = (
         f"A first data set, planned once: {frames['train']} training and {frames['test']} test"
-        f" frames, {empty:.1%} empty pixels, {collect['of_one_colour']:.0%} of the frames of one"
+        f" frames, {empty:.1%} empty pixels, {collect['of_one_color']:.0%} of the frames of one"
         " colour:"
     )
     return "\n".join([*lines, said, "", collect["command"]])
@@ -142,8 +142,8 @@ def _surface_rows(facts: Facts) -> Rows:
         low, middle, high = detail["texels_per_m"]
         text = f"{middle:.0f} (5 % of the textured area below {low:.0f}, 5 % above {high:.0f})"
         rows.append(("texels per metre, median", text))
-    if detail["coloured_vertices_per_m"] is not None:
-        rows.append(("coloured vertices per metre", f"{detail['coloured_vertices_per_m']:.0f}"))
+    if detail["colored_vertices_per_m"] is not None:
+        rows.append(("coloured vertices per metre", f"{detail['colored_vertices_per_m']:.0f}"))
     if backs is not None:
         text = f"{backs:.0%} of what cameras see; drawn like front faces"
         rows.append(("back sides of faces", text))
@@ -189,12 +189,12 @@ def _covered_text(collect: Facts | None) -> str:
 def _part_rows(parts: Sequence[Facts]) -> Rows:
     by_area, rows = sorted(parts, key=lambda part: -part["area_m2"]), []
     for part in by_area[:MAX_PARTS]:
-        colour = {"vertices": "vertex colours", "plain": "one plain colour"}.get(part["colour"], "")
+        color = {"vertices": "vertex colours", "plain": "one plain colour"}.get(part["color"], "")
         if part["texture_px"] is not None:
-            colour = "texture {} x {}".format(*part["texture_px"])
+            color = "texture {} x {}".format(*part["texture_px"])
         cut = "" if part["alpha_cutoff"] is None else f", alpha cut at {part['alpha_cutoff']:.2f}"
         size = f"{part['faces']:>9,} faces  {part['area_m2']:>8.1f} m^2"
-        rows.append((part["name"], f"{size}  {colour}{cut}"))
+        rows.append((part["name"], f"{size}  {color}{cut}"))
     if len(by_area) > MAX_PARTS:
         rows.append(("...", f"and {len(by_area) - MAX_PARTS} more, see inspect.json"))
     return rows

@@ -4,15 +4,15 @@
  *
  * synfealViewer(canvas, scene) returns {setCut, setBackFaces, setLine} or null without WebGL 2.
  *   scene.positions  base64 of int16 x y z; metres are offset_m + step_m * value, z up
- *   scene.colours    base64 of uint8 r g b, one per vertex
+ *   scene.colors    base64 of uint8 r g b, one per vertex
  *   scene.faces      base64 of uint32 triples; counter-clockwise triangles face the viewer
  *   scene.yaw        heading of the first view, radians, 0 along x
- *   scene.polylines  optional [{points: [[x, y, z], ...], colour: [r, g, b]}]: metres, 0 to 255
+ *   scene.polylines  optional [{points: [[x, y, z], ...], color: [r, g, b]}]: metres, 0 to 255
  */
 const SURFACE_VERTEX = `#version 300 es
 uniform mat4 clipFromWorld; uniform vec3 offset; uniform float step;
-in vec3 position; in vec3 colour; out vec3 world; out vec3 tint;
-void main() { world = offset + step * position; tint = colour; gl_Position = clipFromWorld * vec4(world, 1.0); }`;
+in vec3 position; in vec3 color; out vec3 world; out vec3 tint;
+void main() { world = offset + step * position; tint = color; gl_Position = clipFromWorld * vec4(world, 1.0); }`;
 const SURFACE_FRAGMENT = `#version 300 es
 precision highp float;
 uniform float cut; in vec3 world; in vec3 tint; out vec4 pixel;
@@ -26,8 +26,8 @@ uniform mat4 clipFromWorld; in vec3 position;
 void main() { gl_Position = clipFromWorld * vec4(position, 1.0); }`;
 const LINE_FRAGMENT = `#version 300 es
 precision highp float;
-uniform vec3 colour; out vec4 pixel;
-void main() { pixel = vec4(colour, 1.0); }`;
+uniform vec3 color; out vec4 pixel;
+void main() { pixel = vec4(color, 1.0); }`;
 const BACKGROUND = [0.93, 0.94, 0.95];
 const FIELD_OF_VIEW = 0.8;
 
@@ -35,7 +35,7 @@ function synfealViewer(canvas, scene) {
   const gl = canvas.getContext("webgl2", { antialias: true });
   if (!gl) return null;
   const positions = new Int16Array(bytes(scene.positions));
-  const colours = new Uint8Array(bytes(scene.colours));
+  const colors = new Uint8Array(bytes(scene.colors));
   const faces = new Uint32Array(bytes(scene.faces));
   const bounds = boundsOf(positions, scene);
   const surface = program(gl, SURFACE_VERTEX, SURFACE_FRAGMENT);
@@ -43,15 +43,15 @@ function synfealViewer(canvas, scene) {
   const mesh = gl.createVertexArray();
   gl.bindVertexArray(mesh);
   attribute(gl, surface, "position", positions, gl.SHORT, false);
-  attribute(gl, surface, "colour", colours, gl.UNSIGNED_BYTE, true);
+  attribute(gl, surface, "color", colors, gl.UNSIGNED_BYTE, true);
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
   const lines = (scene.polylines || []).map((polyline) => {
     const array = gl.createVertexArray();
     gl.bindVertexArray(array);
     attribute(gl, line, "position", new Float32Array(polyline.points.flat()), gl.FLOAT, false);
-    const colour = polyline.colour.map((c) => c / 255);
-    return { array, count: polyline.points.length, colour, shown: true };
+    const color = polyline.color.map((c) => c / 255);
+    return { array, count: polyline.points.length, color, shown: true };
   });
 
   const home = {
@@ -80,8 +80,8 @@ function synfealViewer(canvas, scene) {
     gl.drawElements(gl.TRIANGLES, faces.length, gl.UNSIGNED_INT, 0);
     gl.useProgram(line);
     gl.uniformMatrix4fv(gl.getUniformLocation(line, "clipFromWorld"), false, clipFromWorld);
-    for (const { array, count, colour } of lines.filter((polyline) => polyline.shown)) {
-      gl.uniform3fv(gl.getUniformLocation(line, "colour"), colour);
+    for (const { array, count, color } of lines.filter((polyline) => polyline.shown)) {
+      gl.uniform3fv(gl.getUniformLocation(line, "color"), color);
       gl.bindVertexArray(array);
       gl.drawArrays(gl.LINE_STRIP, 0, count);
     }

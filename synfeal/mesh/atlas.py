@@ -36,7 +36,7 @@ def texel_size_m(part: MeshPart) -> float:
     return float(np.median(edges))
 
 
-def with_baked_colours(reduced: MeshPart, full: MeshPart, texel_m: float) -> MeshPart:
+def with_baked_colors(reduced: MeshPart, full: MeshPart, texel_m: float) -> MeshPart:
     """Give a simplified part a texture with the vertex colours of the full one.
 
     Args:
@@ -50,7 +50,7 @@ def with_baked_colours(reduced: MeshPart, full: MeshPart, texel_m: float) -> Mes
     charts = _charts(reduced, texel_m)
     pixels, points_m, normals = _texels(charts, reduced)
     image = np.zeros((*charts.size, 3), np.uint8)
-    image[pixels[:, 1], pixels[:, 0]] = _colours_at(points_m, normals, full, texel_m)
+    image[pixels[:, 1], pixels[:, 0]] = _colors_at(points_m, normals, full, texel_m)
     filled = np.zeros(charts.size, np.bool_)
     filled[pixels[:, 1], pixels[:, 0]] = True
     row, column = distance_transform_edt(~filled, return_distances=False, return_indices=True)
@@ -179,7 +179,7 @@ def _unit(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.maximum(length, 1e-30))
 
 
-def _colours_at(
+def _colors_at(
     points_m: Floats, normals: Floats, full: MeshPart, texel_m: float
 ) -> NDArray[np.uint8]:
     """Look up colours (T, 3) of the full mesh at points (T, 3) with normals (T, 3)."""

@@ -38,7 +38,7 @@ def check_mesh(mesh: TexturedMesh, path: Path) -> None:
             )
 
 
-def refuse_colourless(mesh: TexturedMesh, name: str) -> None:
+def refuse_colorless(mesh: TexturedMesh, name: str) -> None:
     """Refuse a mesh without texture and vertex colours whose materials all have one colour."""
     painted = any(p.texture is not None or p.vertex_rgb is not None for p in mesh.parts)
     if not painted and len({part.base_color.tobytes() for part in mesh.parts}) == 1:
@@ -56,13 +56,13 @@ def check_indices(part: MeshPart, path: Path) -> None:
         )
 
 
-def shows_one_colour(mesh: TexturedMesh) -> bool:
+def shows_one_color(mesh: TexturedMesh) -> bool:
     """Check whether every image of the mesh would be of one colour, whatever textures it has."""
-    colours = np.concatenate([_extreme_colours(part) for part in mesh.parts])
-    return bool(np.ptp(colours, axis=0).max() <= LEVELS)
+    colors = np.concatenate([_extreme_colors(part) for part in mesh.parts])
+    return bool(np.ptp(colors, axis=0).max() <= LEVELS)
 
 
-def _extreme_colours(part: MeshPart) -> NDArray[np.float64]:
+def _extreme_colors(part: MeshPart) -> NDArray[np.float64]:
     """Return the least and the greatest value (2, 3) of each channel that a part shows."""
     shown = np.full((1, 3), 255, np.uint8)
     if part.texture is not None:

@@ -83,28 +83,28 @@ class MaterialReader:
         stored: Any = visual.vertex_colors if visual.kind == "vertex" else extra.get("color")
         if stored is None:
             return None
-        colours = np.clip(np.nan_to_num(to_float(stored)), 0.0, 1.0)[:, :3]
+        colors = np.clip(np.nan_to_num(to_float(stored)), 0.0, 1.0)[:, :3]
         is_linear = self._header is not None
-        return srgb_from_linear(colours) if is_linear else np.round(255 * colours).astype(np.uint8)
+        return srgb_from_linear(colors) if is_linear else np.round(255 * colors).astype(np.uint8)
 
     def _from_gltf(self, material: Any) -> BaseMaterial:
         index = int(material.name)  # given by synfeal.mesh.gltf.simplified
         described = dict(enumerate((self._header or {}).get("materials", []))).get(index, {})
         owner = f"material '{described.get('name', 'unnamed')}'"
-        colour = base_color(described)
+        color = base_color(described)
         texture = self._decoded(material.baseColorTexture, owner)
-        base = srgb_from_linear(colour.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0]))
+        base = srgb_from_linear(color.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0]))
         mode = described.get("alphaMode", "OPAQUE")
         cutoff = BLEND_CUTOFF if mode == "BLEND" else None
         if mode == "MASK":
             cutoff = float(described.get("alphaCutoff", GLTF_DEFAULT_CUTOFF))
-        if cutoff is not None and texture is None and "baseColorTexture" in colour:
+        if cutoff is not None and texture is None and "baseColorTexture" in color:
             self._findings.warn(f"{owner}: its transparency was in its texture; drawn opaque")
         if is_opaque(texture, base):
             cutoff = None
         elif cutoff is not None:
             self._note_cutoff(owner, mode == "BLEND", cutoff)
-        transform = uv_transform(colour.get("baseColorTexture", {}))
+        transform = uv_transform(color.get("baseColorTexture", {}))
         return BaseMaterial(texture, base, cutoff, transform)
 
     def _from_mtl(self, material: Any) -> BaseMaterial:

@@ -97,10 +97,10 @@ class _Materials:
 
     def set_exact_factors(self, tree: dict[str, Any]) -> None:
         """Replace the base colours of an exported glTF, which trimesh keeps in 8 linear bits."""
-        colours = [np.frombuffer(base, np.uint8) for _, base, _ in self._made]
+        colors = [np.frombuffer(base, np.uint8) for _, base, _ in self._made]
         for material in tree.get("materials", []):
             index, _, name = material["name"].partition(":")
-            factor = linear_from_srgb(colours[int(index)]).tolist()
+            factor = linear_from_srgb(colors[int(index)]).tolist()
             material.setdefault("pbrMetallicRoughness", {})["baseColorFactor"] = factor
             material["name"] = name
 

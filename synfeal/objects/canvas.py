@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 Pixels = NDArray[np.float32]  # (H, W, 3) display-referred albedo in [0, 1], row 0 on top
-VIVID: tuple[Colour, ...] = (
+VIVID: tuple[Color, ...] = (
     (0.85, 0.15, 0.12), (0.95, 0.55, 0.08), (0.95, 0.85, 0.15), (0.15, 0.55, 0.25),
     (0.1, 0.35, 0.75), (0.45, 0.15, 0.6), (0.9, 0.35, 0.55), (0.1, 0.65, 0.7), (0.1, 0.1, 0.12),
 )  # fmt: skip
-INK: tuple[Colour, ...] = ((0.1, 0.1, 0.12), (0.1, 0.2, 0.75), (0.8, 0.1, 0.1), (0.05, 0.5, 0.2))
+INK: tuple[Color, ...] = ((0.1, 0.1, 0.12), (0.1, 0.2, 0.75), (0.8, 0.1, 0.1), (0.05, 0.5, 0.2))
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class Canvas:
         """Width and height in metres."""
         return self.width_px / self.px_per_m, self.height_px / self.px_per_m
 
-    def plain(self, colour: Colour) -> Pixels:
+    def plain(self, color: Color) -> Pixels:
         """Return one colour everywhere."""
-        return np.full((self.height_px, self.width_px, 3), colour, np.float32)
+        return np.full((self.height_px, self.width_px, 3), color, np.float32)
 
     def coordinates_m(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return metres from the top-left corner: x as (1, W), y as (H, 1)."""
@@ -100,31 +100,31 @@ class Sketch:
         scaled = np.asarray(points, float) * (self.width_px, self.height_px)
         return [(x, y) for x, y in scaled.tolist()]
 
-    def polygon(self, points: ArrayLike, colour: Colour) -> None:
+    def polygon(self, points: ArrayLike, color: Color) -> None:
         """Fill a polygon (N, 2)."""
-        self._draw.polygon(self._at(points), fill=_bytes(colour))
+        self._draw.polygon(self._at(points), fill=_bytes(color))
 
-    def line(self, points: ArrayLike, colour: Colour, width: float = 0.01) -> None:
+    def line(self, points: ArrayLike, color: Color, width: float = 0.01) -> None:
         """Draw a polyline (N, 2); ``width`` is relative to the canvas' height."""
         width_px = max(1, round(width * self.height_px))
-        self._draw.line(self._at(points), fill=_bytes(colour), width=width_px, joint="curve")
+        self._draw.line(self._at(points), fill=_bytes(color), width=width_px, joint="curve")
 
-    def rectangle(self, x0: float, y0: float, x1: float, y1: float, colour: Colour) -> None:
+    def rectangle(self, x0: float, y0: float, x1: float, y1: float, color: Color) -> None:
         """Fill an axis-aligned rectangle."""
-        self.polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], colour)
+        self.polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], color)
 
-    def ellipse(self, x: float, y: float, radius_x: float, radius_y: float, colour: Colour) -> None:
+    def ellipse(self, x: float, y: float, radius_x: float, radius_y: float, color: Color) -> None:
         """Fill an ellipse, radii relative to width and height."""
         angle = np.linspace(0, 2 * np.pi, 32, endpoint=False)
         ring = np.stack([x + radius_x * np.cos(angle), y + radius_y * np.sin(angle)], axis=1)
-        self.polygon(ring, colour)
+        self.polygon(ring, color)
 
     def text_lines(
         self,
         rng: np.random.Generator,
         box: tuple[float, float, float, float],
         rows: int,
-        colour: Colour,
+        color: Color,
     ) -> None:
         """Draw rows of letter-like strokes.
 
@@ -132,7 +132,7 @@ class Sketch:
             rng: Source of the strokes.
             box: Where they stand: x0, y0, x1, y1, 0 to 1 across the canvas.
             rows: Number of rows.
-            colour: Colour of the strokes.
+            color: Colour of the strokes.
         """
         x0, y0, x1, y1 = box
         pitch = (y1 - y0) / rows
@@ -143,7 +143,7 @@ class Sketch:
             while x < end:
                 if rng.random() < 0.82:
                     strokes = rng.uniform((x, y), (x + letter, y + 0.62 * pitch), (3, 2))
-                    self.line(strokes, colour, width=0.12 * pitch)
+                    self.line(strokes, color, width=0.12 * pitch)
                 x += 1.3 * letter
 
     def pixels(self) -> Pixels:
@@ -151,18 +151,18 @@ class Sketch:
         return np.asarray(self._image, np.float32) / np.float32(255)
 
 
-def _bytes(colour: Colour) -> tuple[int, ...]:
-    return tuple(np.round(255 * np.clip(colour, 0, 1)).astype(int).tolist())
+def _bytes(color: Color) -> tuple[int, ...]:
+    return tuple(np.round(255 * np.clip(color, 0, 1)).astype(int).tolist())
 
 
-def pick(rng: np.random.Generator, palette: tuple[Colour, ...]) -> Colour:
+def pick(rng: np.random.Generator, palette: tuple[Color, ...]) -> Color:
     """Draw one colour of a palette."""
     return palette[int(rng.integers(len(palette)))]
 
 
-def shade(colour: Colour, factor: float) -> Colour:
+def shade(color: Color, factor: float) -> Color:
     """Make a colour lighter or darker."""
-    red, green, blue = (min(1.0, channel * factor) for channel in colour)
+    red, green, blue = (min(1.0, channel * factor) for channel in color)
     return red, green, blue
 
 
@@ -177,7 +177,7 @@ def tinted(image: ArrayLike, relief: NDArray[np.float32]) -> Pixels:
     return np.asarray(np.asarray(image, np.float32) * (1 + relief[..., None]), np.float32)
 
 
-def ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pixels:
+def ramp(canvas: Canvas, first: Color, second: Color, angle_rad: float) -> Pixels:
     """Blend from one colour to another across a canvas.
 
     Args:
@@ -193,9 +193,9 @@ def ramp(canvas: Canvas, first: Colour, second: Colour, angle_rad: float) -> Pix
     return mix(first, second, share)
 
 
-def bordered(image: Pixels, share: float, colour: Colour) -> Pixels:
+def bordered(image: Pixels, share: float, color: Color) -> Pixels:
     """Paint a frame as wide as ``share`` of the shorter side over the image's border, in place."""
     margin = max(1, round(share * min(image.shape[:2])))
     for edge in (image[:margin], image[-margin:], image[:, :margin], image[:, -margin:]):
-        edge[:] = colour
+        edge[:] = color
     return image

@@ -8,7 +8,7 @@ from synfeal.objects.canvas import (
     INK,
     VIVID,
     Canvas,
-    Colour,
+    Color,
     Pixels,
     Sketch,
     bordered,
@@ -22,35 +22,35 @@ from synfeal.objects.canvas import (
 
 
 @painter
-def painted(canvas: Canvas, colour: Colour, wear: float = 0.05) -> Pixels:
+def painted(canvas: Canvas, color: Color, wear: float = 0.05) -> Pixels:
     """Paint a smooth surface of paint or plastic: one colour with a little wear.
 
     Args:
         canvas: What is painted on.
-        colour: Red, green and blue.
+        color: Red, green and blue.
         wear: Standard deviation of the brightness, roughly, in parts of the full range.
     """
-    return tinted(colour, wear * canvas.noise(0.08, 3))
+    return tinted(color, wear * canvas.noise(0.08, 3))
 
 
 @painter
-def plaster(canvas: Canvas, colour: Colour, stains: float = 0.03, grain: float = 0.012) -> Pixels:
+def plaster(canvas: Canvas, color: Color, stains: float = 0.03, grain: float = 0.012) -> Pixels:
     """Paint a painted wall: almost no texture, broad stains.
 
     Args:
         canvas: What is painted on.
-        colour: Red, green and blue, 0 to 1.
+        color: Red, green and blue, 0 to 1.
         stains: Standard deviation of the brightness, roughly, over most of a metre.
         grain: The same over a few centimetres.
     """
-    return tinted(colour, stains * canvas.noise(0.9, 5, 0.65) + grain * canvas.noise(0.025, 2))
+    return tinted(color, stains * canvas.noise(0.9, 5, 0.65) + grain * canvas.noise(0.025, 2))
 
 
 @painter
 def wainscot(
     canvas: Canvas,
-    colour: Colour,
-    lower: Colour,
+    color: Color,
+    lower: Color,
     height_m: float = 0.95,
     grain: float = 0.02,
     stains: float = 0.03,
@@ -59,13 +59,13 @@ def wainscot(
 
     Args:
         canvas: What is painted on; its lower edge is the floor.
-        colour: Colour above the rail.
+        color: Colour above the rail.
         lower: Colour below the rail, where stains are twice as strong.
         height_m: Height of the rail above the floor, metres.
         grain: See :func:`plaster`.
         stains: See :func:`plaster`.
     """
-    image = plaster(colour, stains, grain)(canvas)
+    image = plaster(color, stains, grain)(canvas)
     _, y = canvas.coordinates_m()
     above_floor = canvas.size_m[1] - y[:, 0]
     band = above_floor < height_m
@@ -76,21 +76,21 @@ def wainscot(
 
 
 @painter
-def wood(canvas: Canvas, colour: Colour, contrast: float = 0.12) -> Pixels:
+def wood(canvas: Canvas, color: Color, contrast: float = 0.12) -> Pixels:
     """Paint wood grain along x."""
     cell = (0.8, 0.035)
     rings = np.sin(6 * canvas.noise((cell[0] * 3, cell[1] * 3), 2)).astype(np.float32)
     relief = contrast * (0.5 * rings + 0.6 * canvas.noise(cell, 4, 0.75))
-    return tinted(colour, relief.astype(np.float32))
+    return tinted(color, relief.astype(np.float32))
 
 
 @painter
 def masonry(
     canvas: Canvas,
-    palette: tuple[Colour, ...],
+    palette: tuple[Color, ...],
     block_m: tuple[float, float],
     joint_m: float = 0.006,
-    joint: Colour = (0.45, 0.43, 0.4),
+    joint: Color = (0.45, 0.43, 0.4),
     stagger: float = 0.5,
     spread: float = 0.08,
 ) -> Pixels:
@@ -123,42 +123,42 @@ def masonry(
 
 @painter
 def fabric(
-    canvas: Canvas, colour: Colour, stripe: Colour | None = None, pitch_m: float = 0.1
+    canvas: Canvas, color: Color, stripe: Color | None = None, pitch_m: float = 0.1
 ) -> Pixels:
     """Paint cloth with a weave and, if wanted, vertical stripes.
 
     Args:
         canvas: What is painted on.
-        colour: Colour of the cloth; no channel may be 0 where there are stripes.
+        color: Colour of the cloth; no channel may be 0 where there are stripes.
         stripe: Colour of the stripes; None for no stripes.
         pitch_m: Distance from one stripe to the next, metres; each takes 0.3 of it.
     """
-    image = tinted(colour, 0.06 * canvas.noise(0.012, 2) + 0.06 * canvas.noise(0.3, 3))
+    image = tinted(color, 0.06 * canvas.noise(0.012, 2) + 0.06 * canvas.noise(0.3, 3))
     if stripe is not None:
         x, _ = canvas.coordinates_m()
         inside = (x[0] / pitch_m) % 1 < 0.3
-        image[:, inside] *= np.divide(stripe, colour, dtype=np.float32)
+        image[:, inside] *= np.divide(stripe, color, dtype=np.float32)
     return image
 
 
 @painter
-def marble(canvas: Canvas, colour: Colour, vein: Colour, scale_m: float = 0.35) -> Pixels:
+def marble(canvas: Canvas, color: Color, vein: Color, scale_m: float = 0.35) -> Pixels:
     """Paint polished stone with turbulent veins.
 
     Args:
         canvas: What is painted on.
-        colour: Colour of the stone.
+        color: Colour of the stone.
         vein: Colour of the veins.
         scale_m: Size of the coarsest cells of the noise that veins follow, metres.
     """
     turbulence = canvas.noise(scale_m, 6, 0.65)
     share = np.exp(-9 * np.abs(turbulence)).astype(np.float32)
     share = np.clip(share + 0.12 * canvas.noise(scale_m / 3, 4), 0, 1)
-    return mix(colour, vein, share)
+    return mix(color, vein, share)
 
 
 @painter
-def rug(canvas: Canvas, palette: tuple[Colour, ...]) -> Pixels:
+def rug(canvas: Canvas, palette: tuple[Color, ...]) -> Pixels:
     """Paint a woven rug: nested borders around a field of random diamonds."""
     x, y = canvas.coordinates_m()
     width, height = canvas.size_m
@@ -175,12 +175,12 @@ def rug(canvas: Canvas, palette: tuple[Colour, ...]) -> Pixels:
 
 
 @painter
-def damask(canvas: Canvas, colour: Colour, motif: Colour, pitch_m: float = 0.22) -> Pixels:
+def damask(canvas: Canvas, color: Color, motif: Color, pitch_m: float = 0.22) -> Pixels:
     """Paint wallpaper with a repeated flower-like motif; repetition is the point.
 
     Args:
         canvas: What is painted on.
-        colour: Colour of the ground.
+        color: Colour of the ground.
         motif: Colour of the motif.
         pitch_m: Distance from one motif to the next in a row, metres; rows are 0.8 of it apart.
     """
@@ -190,13 +190,13 @@ def damask(canvas: Canvas, colour: Colour, motif: Colour, pitch_m: float = 0.22)
     v = ((y / (0.8 * pitch_m)) % 1 - 0.5) * 2
     radius, angle = np.hypot(u, v), np.arctan2(v, u)
     petal = radius < 0.35 + 0.3 * np.cos(5 * angle)
-    image = plaster(colour, 0.05)(canvas)
+    image = plaster(color, 0.05)(canvas)
     image[petal] = motif
     return tinted(image, 0.03 * canvas.noise(0.02, 2))
 
 
-METAL: Colour = (0.75, 0.76, 0.78)
-PAPER: Colour = (0.93, 0.92, 0.88)
+METAL: Color = (0.75, 0.76, 0.78)
+PAPER: Color = (0.93, 0.92, 0.88)
 
 
 @painter
@@ -210,16 +210,16 @@ def screen(canvas: Canvas) -> Pixels:
         dark = rng.random() < 0.5
         sketch.rectangle(x, y, x1, y1, (0.12, 0.12, 0.15) if dark else (0.95, 0.95, 0.95))
         sketch.rectangle(x, y, x1, y + 0.05, shade(pick(rng, VIVID), 0.9))
-        ink: Colour = (0.6, 0.9, 0.7) if dark else (0.15, 0.15, 0.2)
+        ink: Color = (0.6, 0.9, 0.7) if dark else (0.15, 0.15, 0.2)
         sketch.text_lines(rng, (x + 0.02, y + 0.08, x1 - 0.02, y1 - 0.03), 7, ink)
     return bordered(sketch.pixels(), 0.05, (0.06, 0.06, 0.07))
 
 
 @painter
-def spine(canvas: Canvas, colour: Colour) -> Pixels:
+def spine(canvas: Canvas, color: Color) -> Pixels:
     """Paint the back of a book: cloth, two bands and a title."""
     rng = canvas.rng
-    sketch = Sketch(plaster(colour, 0.06, 0.03)(canvas))
+    sketch = Sketch(plaster(color, 0.06, 0.03)(canvas))
     bands = shade(pick(rng, VIVID), rng.uniform(0.6, 1.6))
     for y in (rng.uniform(0.06, 0.15), rng.uniform(0.8, 0.92)):
         sketch.rectangle(0, y, 1, y + 0.04, bands)
@@ -229,36 +229,36 @@ def spine(canvas: Canvas, colour: Colour) -> Pixels:
 
 
 @painter
-def door(canvas: Canvas, colour: Colour, window: bool = False) -> Pixels:
+def door(canvas: Canvas, color: Color, window: bool = False) -> Pixels:
     """Paint a door leaf with frame, panels, handle and, if wanted, a small window."""
-    sketch = Sketch(plaster(colour, 0.05, 0.03)(canvas))
-    dark = shade(colour, 0.7)
+    sketch = Sketch(plaster(color, 0.05, 0.03)(canvas))
+    dark = shade(color, 0.7)
     for y0, y1 in ((0.1, 0.45), (0.55, 0.92)):
         sketch.rectangle(0.18, y0, 0.82, y1, dark)
-        sketch.rectangle(0.2, y0 + 0.01, 0.8, y1 - 0.01, shade(colour, 1.1))
+        sketch.rectangle(0.2, y0 + 0.01, 0.8, y1 - 0.01, shade(color, 1.1))
     if window:
         sketch.rectangle(0.35, 0.12, 0.65, 0.4, (0.75, 0.85, 0.9))
     sketch.rectangle(0.85, 0.49, 0.93, 0.53, (0.8, 0.75, 0.5))
-    return bordered(sketch.pixels(), 0.07, shade(colour, 0.55))
+    return bordered(sketch.pixels(), 0.07, shade(color, 0.55))
 
 
 @painter
-def cabinet_front(canvas: Canvas, colour: Colour, doors: int = 2, rows: int = 1) -> Pixels:
+def cabinet_front(canvas: Canvas, color: Color, doors: int = 2, rows: int = 1) -> Pixels:
     """Paint doors or drawers, each with a handle and a label.
 
     Args:
         canvas: What is painted on.
-        colour: Colour of the fronts, varied a little from one to the next.
+        color: Colour of the fronts, varied a little from one to the next.
         doors: Number of them side by side.
         rows: Number of them one above the other.
     """
-    sketch = Sketch(plaster(colour, 0.05, 0.03)(canvas))
+    sketch = Sketch(plaster(color, 0.05, 0.03)(canvas))
     for column in range(doors):
         for row in range(rows):
             x0, x1 = (column + 0.03) / doors, (column + 0.97) / doors
             y0, y1 = (row + 0.03) / rows, (row + 0.97) / rows
-            tint = shade(colour, canvas.rng.uniform(0.9, 1.12))
-            sketch.rectangle(x0, y0, x1, y1, shade(colour, 0.5))
+            tint = shade(color, canvas.rng.uniform(0.9, 1.12))
+            sketch.rectangle(x0, y0, x1, y1, shade(color, 0.5))
             sketch.rectangle(x0 + 0.008, y0 + 0.008, x1 - 0.008, y1 - 0.008, tint)
             middle, wide = (x0 + x1) / 2, (x1 - x0) / 5
             sketch.rectangle(middle - wide, y0 + 0.1 / rows, middle + wide, y0 + 0.13 / rows, METAL)
@@ -291,9 +291,9 @@ def page(canvas: Canvas) -> Pixels:
 
 
 @painter
-def label(canvas: Canvas, colour: Colour) -> Pixels:
+def label(canvas: Canvas, color: Color) -> Pixels:
     """Paint a carton with a printed label."""
-    sketch = Sketch(plaster(colour, 0.06, 0.03)(canvas))
+    sketch = Sketch(plaster(color, 0.06, 0.03)(canvas))
     sketch.rectangle(0.15, 0.2, 0.85, 0.8, PAPER)
     sketch.text_lines(canvas.rng, (0.2, 0.28, 0.8, 0.75), 3, pick(canvas.rng, INK))
     return sketch.pixels()

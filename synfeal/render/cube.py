@@ -25,7 +25,7 @@ from synfeal.render.distorted import (
     LONGEST_SIDE_PX,
     MARGIN_PX,
     OVERSAMPLING,
-    colour_matrix,
+    color_matrix,
     pixels_of_rows,
     resampled_depth,
     taps,
@@ -72,14 +72,14 @@ class CubeRenderer(Renderer):
         self._drawn = np.unique(faces[faces >= 0])
         self._cam_from_face = CAM_FROM_FACE[self._drawn]
         size = (len(self._drawn) * face.height, face.width)
-        self._colour = colour_matrix(
+        self._color = color_matrix(
             lambda rows, offset: self._located(
                 face, rays_of_pixels(camera, pixels_of_rows(camera, rows, offset))
             ),
             size=self._shape,
             drawn_size=size,
         )
-        unseen = 1.0 - np.asarray(self._colour.sum(axis=1), np.float32).reshape(-1, 1)
+        unseen = 1.0 - np.asarray(self._color.sum(axis=1), np.float32).reshape(-1, 1)
         self._behind = unseen * np.array(background_rgb, np.float32)
         self._depth_taps = taps(self._located(face, rays), face.width)
         self._slant = self._slant_of(rays)
@@ -123,7 +123,7 @@ class CubeRenderer(Renderer):
         """Bound, in each drawn face, the pixels that colours or depth are read from."""
         index, weight = self._depth_taps
         read = np.zeros(len(self._drawn) * face.height * face.width, bool)
-        read[self._colour.indices[self._colour.data > 0.0]] = True
+        read[self._color.indices[self._color.data > 0.0]] = True
         read[index[weight.any(axis=-1)]] = True
         windows = []
         for image in read.reshape(-1, face.height, face.width):
@@ -161,7 +161,7 @@ class CubeRenderer(Renderer):
             return np.asarray(1.0 / np.nan_to_num(towards, nan=0.0), np.float32)
 
     def _resampled(self, faces_rgb: NDArray[np.uint8]) -> Rgb:
-        mean = self._colour @ faces_rgb.reshape(-1, 3).astype(np.float32) + self._behind
+        mean = self._color @ faces_rgb.reshape(-1, 3).astype(np.float32) + self._behind
         pixels: Rgb = np.rint(mean).astype(np.uint8).reshape(*self._shape, 3)
         return pixels
 

@@ -41,7 +41,7 @@ class DistortedRenderer(Renderer):
         """Open the inner renderer with the camera that :func:`covering_camera` gives."""
         self._shape = (camera.height, camera.width)
         pinhole = covering_camera(camera)
-        self._colour = colour_matrix(
+        self._color = color_matrix(
             lambda rows, offset: _seen_at(camera, pinhole, rows, offset),
             size=self._shape,
             drawn_size=(pinhole.height, pinhole.width),
@@ -73,7 +73,7 @@ class DistortedRenderer(Renderer):
         self._inner.close()
 
     def _resampled(self, rgb: Rgb) -> Rgb:
-        mean = self._colour @ rgb.reshape(-1, 3).astype(np.float32)
+        mean = self._color @ rgb.reshape(-1, 3).astype(np.float32)
         pixels: Rgb = np.rint(mean).astype(np.uint8).reshape(*self._shape, 3)
         return pixels
 
@@ -168,7 +168,7 @@ def taps(pixel: Array, width: int) -> tuple[NDArray[np.int32], NDArray[np.float3
     return index.astype(np.int32), (weight * shown).astype(np.float32)
 
 
-def colour_matrix(
+def color_matrix(
     locate: Locate, size: tuple[int, int], drawn_size: tuple[int, int]
 ) -> sparse.csr_matrix:
     """Build the matrix that makes the pixels of an image from those of a drawn one.

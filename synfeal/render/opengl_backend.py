@@ -137,12 +137,12 @@ class OpenglRenderer(Renderer):
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
         with self._context:
-            return self._draw_colour(world_from_cam)
+            return self._draw_color(world_from_cam)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Render colours (H, W, 3) and depth (H, W), metres along the optical axis or inf."""
         with self._context:
-            rgb = self._draw_colour(world_from_cam)
+            rgb = self._draw_color(world_from_cam)
             return rgb, self._draw_depth(self._clip_from_mesh(world_from_cam))
 
     def render_depth(self, world_from_cam: NDArray[np.float64]) -> Depth:
@@ -181,14 +181,14 @@ class OpenglRenderer(Renderer):
         centred[:3, 3] -= self._centre_m
         return np.asarray(self._clip_from_cam @ inverse(centred))
 
-    def _draw_colour(self, world_from_cam: NDArray[np.float64]) -> Rgb:
+    def _draw_color(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         clip_from_mesh = self._clip_from_mesh(world_from_cam)
         culled = self._window_from_clip @ clip_from_mesh
         camera_m = np.asarray(world_from_cam)[:3, 3] - self._centre_m
         self._begin(self._sample_target, *self._background, per_pixel=self._supersampling)
         for part in self._parts:
             part.light_from(camera_m)
-            part.draw(part.colour, clip_from_mesh, culled)
+            part.draw(part.color, clip_from_mesh, culled)
         self._mean_target.scissor = self._box(1)
         self._mean_target.use()
         self._context.enable_only(moderngl.NOTHING)

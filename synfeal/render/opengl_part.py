@@ -132,17 +132,17 @@ class DevicePart:
         if part.vertex_rgb is not None:
             rgba = np.pad(part.vertex_rgb[used], ((0, 0), (0, 1)))  # rows of 4 bytes
             rgb = [self._attribute(rgba, "3f1 1x1", "corner_rgb")]
-        features = ["TEXTURED"] * bool(uv) + ["COLOURED"] * bool(rgb)
+        features = ["TEXTURED"] * bool(uv) + ["COLORED"] * bool(rgb)
         if pixels is not None and pixels.shape[2] == 4:
             features.append("CUT_OUT")
         self._has_headlight = floor_share < 1.0
         lit = [*features, "HEADLIGHT"] if self._has_headlight else features
-        self.colour = self._program("colour.frag", lit, [position, *uv, *rgb])
+        self.color = self._program("color.frag", lit, [position, *uv, *rgb])
         if self._has_headlight:
-            self.colour.program["floor_share"].value = floor_share
-        self.colour.program["base_rgb"].value = tuple(part.base_color[:3] / 255.0)
+            self.color.program["floor_share"].value = floor_share
+        self.color.program["base_rgb"].value = tuple(part.base_color[:3] / 255.0)
         if uv:
-            self.colour.program["level_bias"].value = LEVEL_BIAS
+            self.color.program["level_bias"].value = LEVEL_BIAS
         self._cut_out = ["TEXTURED", "CUT_OUT"] if "CUT_OUT" in features else []
         self._solid = [position, *(uv if self._cut_out else [])]
         self.depth = self._program("depth.frag", self._cut_out, self._solid)
@@ -168,7 +168,7 @@ class DevicePart:
     def light_from(self, camera_m: Floats) -> None:
         """Put the headlight, if there is one, at a camera (3,), relative to the centre."""
         if self._has_headlight:
-            self.colour.program["camera"].value = tuple(camera_m.tolist())
+            self.color.program["camera"].value = tuple(camera_m.tolist())
 
     def draw(
         self,
@@ -180,7 +180,7 @@ class DevicePart:
         """Draw into the framebuffer in use.
 
         Args:
-            triangles: ``colour``, ``depth`` along the optical axis, or ``faces``.
+            triangles: ``color``, ``depth`` along the optical axis, or ``faces``.
             clip_from_mesh: Projection (4, 4).
             culled_from_mesh: The same of the part of the image that is drawn: chunks outside of its
                 frustum are left out.

@@ -63,7 +63,7 @@ except AttributeError as error:  # of PyOpenGL, where a library lacks functions 
 CAM_FROM_GL: NDArray[np.float64] = np.diag([1.0, -1.0, -1.0, 1.0])
 # Half a level sharper than the nearest one: samples are averaged, so that textures may alias a
 # little. Depth asks whether the very texel at the pixel's centre is cut out.
-COLOUR_BIAS, DEPTH_BIAS = -0.5, -100.0
+COLOR_BIAS, DEPTH_BIAS = -0.5, -100.0
 
 
 @functools.cache
@@ -90,7 +90,7 @@ def _context() -> tuple[Any, _Pass, _Pass, _Pass]:
     halves = (GL.GL_RGB, GL.GL_FLOAT)  # two channels, which the bindings cannot read alone
     return (
         platform,
-        _Pass(uploaded, 0, COLOUR_BIAS, GL.GL_RGBA8, rgb, np.uint8),
+        _Pass(uploaded, 0, COLOR_BIAS, GL.GL_RGBA8, rgb, np.uint8),
         _Pass(uploaded, 1, DEPTH_BIAS, GL.GL_R32F, depth, np.float32),
         _Pass(uploaded, 2, DEPTH_BIAS, GL.GL_RG32F, halves, np.float32),
     )
@@ -105,7 +105,7 @@ class PyrenderRenderer(Renderer):
         """Prepare the mesh, which is uploaded by the first render."""
         self._supersampling = render.supersampling
         self._floor_share = floor_share(render)
-        self._platform, self._colour, self._depth, self._faces = _context()
+        self._platform, self._color, self._depth, self._faces = _context()
         self._size = (camera.width, camera.height)
         self._intrinsics = camera.intrinsics
         self._background = np.array([*render.background_rgb, 0]) / 255.0
@@ -123,7 +123,7 @@ class PyrenderRenderer(Renderer):
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
         self._look_from(world_from_cam)
-        samples = self._drawn(self._colour, self._supersampling, self._background)
+        samples = self._drawn(self._color, self._supersampling, self._background)
         return mean_of_samples(samples, self._supersampling)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
@@ -161,7 +161,7 @@ class PyrenderRenderer(Renderer):
     def close(self) -> None:
         """Free the scene's buffers and textures."""
         self._platform.make_current()
-        self._colour.forget(self._scene)
+        self._color.forget(self._scene)
         self._scene.clear()
 
 

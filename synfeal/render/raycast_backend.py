@@ -39,7 +39,7 @@ class RaycastRenderer(Renderer):
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Render colours (H, W, 3) from a pose ``world_from_cam`` (4, 4)."""
-        return self._image(self._colours, world_from_cam, self._samples_px, self._sample_size)
+        return self._image(self._colors, world_from_cam, self._samples_px, self._sample_size)
 
     def render_rgbd(self, world_from_cam: NDArray[np.float64]) -> tuple[Rgb, Depth]:
         """Render colours (H, W, 3) and depth (H, W), metres along the optical axis or inf."""
@@ -102,7 +102,7 @@ class RaycastRenderer(Renderer):
     def _faces(self, view: View, rays: Floats) -> Faces:
         return self._triangles.face_of_mesh[self._triangles.first_drawn(view, rays)[0]]
 
-    def _colours(self, view: View, rays: Floats) -> Rgb:
+    def _colors(self, view: View, rays: Floats) -> Rgb:
         hit, points = self._points(view, rays)
         rgb = np.tile(self._background, (len(rays), 1))
         rgb[hit] = self._triangles.rgb(view, points)

@@ -164,12 +164,12 @@ def _textures(parts: list[MeshPart]) -> tuple[list[NDArray[np.uint8]], NDArray[n
 
 def _rows(parts: list[MeshPart], centre_m: Floats) -> Floats:
     """Tabulate per triangle (F, 3 | 6, 4) plane distance, u, v, and red, green, blue if needed."""
-    is_coloured = any(part.vertex_rgb is not None for part in parts)
+    is_colored = any(part.vertex_rgb is not None for part in parts)
     rows = []
     for part in parts:
         corners = (part.vertices_m - centre_m)[part.faces]
         values = [np.zeros((len(part.vertices_m), 2)) if part.uv is None else part.uv]
-        if is_coloured:
+        if is_colored:
             rgb = part.vertex_rgb
             values.append(np.ones((len(part.vertices_m), 3)) if rgb is None else rgb / 255.0)
         rows.append(_linear(corners, np.hstack(values)[part.faces]))

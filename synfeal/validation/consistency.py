@@ -41,7 +41,7 @@ MIN_OVERLAP = 0.2
 SMALL_STEP_M = 0.3
 SMALL_TURN = 0.25  # of the field of view
 # From much nearer or farther, a texture is drawn at another level of detail.
-COLOUR_OVERLAP = 0.6
+COLOR_OVERLAP = 0.6
 VIEWS_BYTES = 2**29  # of frames that are kept decoded; a pixel of one takes 13
 CAMERA_PAIRS = 200  # from which the camera is judged, evenly spread over more
 
@@ -68,8 +68,8 @@ TIMES = " times what rounding and slant explain"
 MEASURES = (
     Measure("depth", "depth", 1.0, TIMES, "median difference in depth"),
     Measure("surfaces", "in_front", 0.05, "", "share of points in front of what is seen"),
-    Measure("colours", "grey", 15.0, " grey levels", "median difference in grey", COLOUR_OVERLAP),
-    Measure("alignment", "shift_px", 0.12, " px", "shift that explains the grey", COLOUR_OVERLAP),
+    Measure("colours", "grey", 15.0, " grey levels", "median difference in grey", COLOR_OVERLAP),
+    Measure("alignment", "shift_px", 0.12, " px", "shift that explains the grey", COLOR_OVERLAP),
 )
 
 

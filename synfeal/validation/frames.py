@@ -33,13 +33,13 @@ Poses = dict[Frame, NDArray[np.float64]]
 
 EVERY = 4  # rows and columns that are looked at for what is blank
 SAME = 2  # grey levels
-ONE_COLOUR = 0.95  # of a frame's pixels
+ONE_COLOR = 0.95  # of a frame's pixels
 # Share of the frames: a camera may come close to a plain wall, and rooms without a ceiling have
 # empty frames, of which collect says how many.
-ONE_COLOUR_FRAMES, EMPTY_FRAMES = "of one colour", "more than half empty"
-MOST = {ONE_COLOUR_FRAMES: 0.05, EMPTY_FRAMES: 0.25}
+ONE_COLOR_FRAMES, EMPTY_FRAMES = "of one colour", "more than half empty"
+MOST = {ONE_COLOR_FRAMES: 0.05, EMPTY_FRAMES: 0.25}
 REMEDIES = {
-    ONE_COLOUR_FRAMES: "look at preview.png; synfeal collect --min-clearance keeps cameras off"
+    ONE_COLOR_FRAMES: "look at preview.png; synfeal collect --min-clearance keeps cameras off"
     " walls, --shade lights a mesh of plain colours",
     EMPTY_FRAMES: "look at preview.png; synfeal collect --min-seen 0.9 refuses views past the mesh",
 }
@@ -129,8 +129,8 @@ def check_images(
                         )
             if COLOR in images:
                 n_frames += 1
-                if is_of_one_colour(images[COLOR]):
-                    blank[ONE_COLOUR_FRAMES].append(frame)
+                if is_of_one_color(images[COLOR]):
+                    blank[ONE_COLOR_FRAMES].append(frame)
                 if _is_mostly_empty(images[COLOR], images.get(DEPTH) if camera else None):
                     blank[EMPTY_FRAMES].append(frame)
             on_frame()
@@ -158,11 +158,11 @@ def _content(n_frames: int, blank: Mapping[str, list[Frame]]) -> Check:
     return Check("content", f"of {n_frames} frames {', '.join(said)}", tuple(failures))
 
 
-def is_of_one_colour(rgb: Pixels) -> bool:
+def is_of_one_color(rgb: Pixels) -> bool:
     """Check whether nearly all pixels of an image (H, W, 3) have about the same colour."""
     rgb = rgb[::EVERY, ::EVERY]
     usual = np.median(rgb.reshape(-1, 3), axis=0)
-    return bool(np.mean((np.abs(rgb - usual) <= SAME).all(axis=2)) >= ONE_COLOUR)
+    return bool(np.mean((np.abs(rgb - usual) <= SAME).all(axis=2)) >= ONE_COLOR)
 
 
 def _is_mostly_empty(rgb: Pixels, depth_mm: Pixels | None) -> bool:

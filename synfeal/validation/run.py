@@ -83,11 +83,11 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     rigid = rigid_poses(poses, bound)
     geometry = _geometry(sequences, rigid, camera, every_pair)
     if has_headlight(dataset):
-        geometry = [_unjudged(c) if c.name in OF_COLOURS else c for c in geometry]
+        geometry = [_unjudged(c) if c.name in OF_COLORS else c for c in geometry]
     return [*checks, *geometry, *_stereo(sequences, rigid, camera, every_pair)]
 
 
-OF_COLOURS = ("colours", "alignment")
+OF_COLORS = ("colours", "alignment")
 
 
 def _unjudged(check: Check) -> Check:

@@ -9,7 +9,7 @@ from baselines.training import resume
 from baselines.training.averaging import EVERY, LAST_SHARE, WeightAverage
 from baselines.training.fit import PHOTOGRAPHS, Fitting
 from tests.baselines.test_training_resume import assert_same
-from tests.support.coloured_frames import train, write_split
+from tests.support.colored_frames import train, write_split
 
 STEPS = 100
 

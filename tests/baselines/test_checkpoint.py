@@ -13,7 +13,7 @@ from baselines.training.predict import predict
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
 from synfeal.records.files import write_json
-from tests.support.coloured_frames import HYPER, NETWORK, save, untrained
+from tests.support.colored_frames import HYPER, NETWORK, save, untrained
 
 CPU = torch.device("cpu")
 

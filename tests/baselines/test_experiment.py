@@ -8,7 +8,7 @@ from baselines.training.predict import predict_poses
 from baselines.training.score import write_scores
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
-from tests.support.coloured_frames import HYPER, NETWORK, TRAINING, write_split
+from tests.support.colored_frames import HYPER, NETWORK, TRAINING, write_split
 
 N_TEST = 20
 CAMERA = CameraConfig(width=32, height=32)

@@ -24,7 +24,7 @@ from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.records.files import write_json
 from synfeal.records.tables import read_records
 from tests.support.collected import refused
-from tests.support.coloured_frames import NETWORK, answering, save, untrained
+from tests.support.colored_frames import NETWORK, answering, save, untrained
 
 COUNT = 120  # more than a batch
 WIDTH, HEIGHT = 52, 39

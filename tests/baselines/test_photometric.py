@@ -65,8 +65,8 @@ def test_what_is_empty_shows_random_colours_and_nothing_else_changes():
     images[0, :, 4:9, 6:12] = 3
     images[1, 0] = 2  # dark in one channel alone: something is seen there
     images[1, 1:] = 4
-    colours = torch.tensor([0.2, 0.6, 1.0])[None, :, None, None].expand(2, 3, 4, 4)
-    found = filled(images, 3, colours)
+    colors = torch.tensor([0.2, 0.6, 1.0])[None, :, None, None].expand(2, 3, 4, 4)
+    found = filled(images, 3, colors)
     hole = torch.zeros(SIDE, SIDE, dtype=torch.bool)
     hole[3:10, 5:13] = True  # and the pixels around it, whose edge was averaged with nothing
     expected = torch.tensor([51, 153, 255], dtype=torch.uint8)[:, None].expand(3, int(hole.sum()))
@@ -196,11 +196,11 @@ def test_blur_hits_its_share_of_the_images():
 
 def test_a_rectangle_covers_what_it_says():
     edges = [torch.tensor([value]) for value in (3, 5, 7, 2)]  # left, top, width, height
-    colour = torch.tensor([[0.1, 0.2, 0.3]])
-    found = covered(torch.ones(1, 3, SIDE, SIDE), Rectangles(*edges, colour))[0]
+    color = torch.tensor([[0.1, 0.2, 0.3]])
+    found = covered(torch.ones(1, 3, SIDE, SIDE), Rectangles(*edges, color))[0]
     hidden = torch.zeros(SIDE, SIDE, dtype=torch.bool)
     hidden[5:7, 3:10] = True
-    assert torch.equal(found[:, hidden], colour[0][:, None].expand(3, 14))
+    assert torch.equal(found[:, hidden], color[0][:, None].expand(3, 14))
     assert (found[:, ~hidden] == 1).all()
 
 

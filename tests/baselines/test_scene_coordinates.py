@@ -18,7 +18,7 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
 from tests.support.property_support import table_of
-from tests.support.room_scene import CAMERA, FURNISHED, cast, colour_of, pose_at, write_room
+from tests.support.room_scene import CAMERA, FURNISHED, cast, color_of, pose_at, write_room
 
 WALL_M = 3.0  # x of the wall
 SMALL = CameraConfig(width=32, height=24, horizontal_fov_deg=60.0)
@@ -37,8 +37,8 @@ def wall_views(poses):
     """Views of the wall, red by y and green by z; depth in closed form."""
     column, row = np.meshgrid(np.arange(SMALL.width) + 0.5, np.arange(SMALL.height) + 0.5)
     point_m, _ = on_wall(poses, np.stack([column, row], axis=-1))
-    colour = np.clip(255 * (point_m[..., 1:] - [-2.5, -1.0]) / [5.0, 4.5], 0, 255)
-    images = np.concatenate([colour, np.full((*colour.shape[:3], 1), 90.0)], axis=-1)
+    color = np.clip(255 * (point_m[..., 1:] - [-2.5, -1.0]) / [5.0, 4.5], 0, 255)
+    images = np.concatenate([color, np.full((*color.shape[:3], 1), 90.0)], axis=-1)
     pixel = cell_pixels(SMALL, SMALL.width, SMALL.height)
     slope = normalised_of_pixels(SMALL, pixel)
     return Views(images.astype(np.uint8), slope, on_wall(poses, pixel)[1].astype(np.float32))
@@ -81,7 +81,7 @@ def test_frames_are_reduced_and_cells_have_the_depth_behind_their_middle(tmp_pat
     for frame, pose in enumerate(poses):
         depth_m, point_m = cast(pose, FURNISHED)
         assert views.depth_m[frame, 2, 3] == pytest.approx(depth_m[42, 62], abs=6e-4)
-        blocks = colour_of(point_m, FURNISHED).reshape(24, 5, 32, 5, 3).astype(float)
+        blocks = color_of(point_m, FURNISHED).reshape(24, 5, 32, 5, 3).astype(float)
         np.testing.assert_allclose(views.images[frame], blocks.mean((1, 3)), atol=1)
     with pytest.raises(InputError, match="seq-02: cannot be read as a sequence"):
         write_views([tmp_path / "seq-02"], "train", 2, CAMERA, (32, 24), tmp_path / "none.npz")

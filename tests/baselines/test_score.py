@@ -15,7 +15,7 @@ from baselines.training.score import score_common, score_run
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.records.tables import read_records
-from tests.support.coloured_frames import NETWORK, answering, save
+from tests.support.colored_frames import NETWORK, answering, save
 from tests.support.property_support import random_table
 
 N = 40

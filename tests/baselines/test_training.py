@@ -18,14 +18,14 @@ from baselines.training.score import score_run
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.errors import InputError
 from synfeal.records.tables import read_records
-from tests.support.coloured_frames import (
+from tests.support.colored_frames import (
     CPU,
     HYPER,
     NETWORK,
     PX,
     TRAINING,
     Jitter,
-    coloured_frames,
+    colored_frames,
     read_split,
     statistics_of,
     train,
@@ -143,7 +143,7 @@ def test_too_few_frames_another_size_and_no_labels_are_refused(split, tmp_path):
         read_images(split[0], 5, 64, CPU)
     with pytest.raises(InputError, match="packed frames"):
         read_images(tmp_path / "absent.npy", 5, PX, CPU)
-    _, table = coloured_frames(1, np.random.default_rng(0))
+    _, table = colored_frames(1, np.random.default_rng(0))
     write_pose_table(tmp_path / "empty.csv", table.first(0))
     with pytest.raises(InputError, match="no rows"):
         read_labelled_frames(split[0], tmp_path / "empty.csv", PX, CPU)

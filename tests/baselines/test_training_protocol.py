@@ -19,7 +19,7 @@ from reproduction.design.experiments import Run
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.errors import InputError
 from synfeal.records.tables import read_records
-from tests.support.coloured_frames import (
+from tests.support.colored_frames import (
     HYPER,
     NETWORK,
     TRAINING,

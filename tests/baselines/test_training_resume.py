@@ -12,7 +12,7 @@ import torch
 from baselines.training import resume
 from baselines.training.resume import digest
 from synfeal.records.files import unfinished_prefix
-from tests.support.coloured_frames import HYPER, TRAINING, Jitter, train, write_split
+from tests.support.colored_frames import HYPER, TRAINING, Jitter, train, write_split
 
 SAMPLES, STEPS, KILLED_AT = 192, 12, 9
 DROPOUT = HYPER.model_copy(update={"dropout": 0.5})
@@ -85,7 +85,7 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 from baselines.training import resume
-from tests.support.coloured_frames import Jitter
+from tests.support.colored_frames import Jitter
 from tests.baselines.test_training_resume import KILLED_AT, run
 resume.RESUME_EVERY_S = 0.0
 folder = Path(sys.argv[1])

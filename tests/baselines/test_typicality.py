@@ -26,7 +26,7 @@ from synfeal.cli import main
 from synfeal.evaluation.formats import read_estimates
 from synfeal.records.tables import read_records
 from tests.support.collected import refused
-from tests.support.coloured_frames import CPU, PX, coloured_frames, untrained
+from tests.support.colored_frames import CPU, PX, colored_frames, untrained
 
 
 def unit(rng, *shape):
@@ -49,7 +49,7 @@ def labelled(images):
 @pytest.fixture(scope="module")
 def place():
     """Frames of one place: learned from, held out, and further ones."""
-    images, _ = coloured_frames(420, np.random.default_rng(0))
+    images, _ = colored_frames(420, np.random.default_rng(0))
     return labelled(images[:200]), labelled(images[200:300]), images[300:]
 
 
@@ -149,8 +149,8 @@ def test_a_backbone_may_return_one_tensor(keeps_maps):
     trained = untrained()
     images = trained.statistics.normalise(labelled(foreign_images(7)).images)
     trained.network.backbone = Averaging(keeps_maps)
-    colour = images.mean((2, 3))
-    expected = colour / colour.norm(dim=1, keepdim=True)
+    color = images.mean((2, 3))
+    expected = color / color.norm(dim=1, keepdim=True)
     np.testing.assert_allclose(features_of(trained.network, images), expected, atol=1e-6)
 
 

@@ -24,7 +24,7 @@ from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.errors import InputError
 from tests.baselines.test_references import BESIDE, seen
 from tests.reproduction.test_label_error import BATCH, CFG, drifting, straight
-from tests.support.coloured_frames import CPU, PX, write_split
+from tests.support.colored_frames import CPU, PX, write_split
 from tests.support.property_support import random_table, table_of
 
 REPOSITORY = Path(__file__).parents[2]

@@ -15,7 +15,7 @@ from baselines.training.predict import predict
 from baselines.training.virtual_views import VirtualViews, mean_quat_wxyz, paired_rotations_rad
 from synfeal.cli import main
 from tests.support.collected import refused
-from tests.support.coloured_frames import NETWORK, save, untrained
+from tests.support.colored_frames import NETWORK, save, untrained
 
 CAMERA = FrameCamera(width=80, height=60, fx=70.0, fy=72.0, cx=39.0, cy=31.0)
 TURNS = AugmentationConfig(tilt_deg=8.0, roll_deg=15.0)

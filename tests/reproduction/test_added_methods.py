@@ -108,7 +108,7 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
 from synfeal.geometry.poses import pose_error
 from synfeal.records.files import read_json
-from tests.support.coloured_frames import CPU, train, write_split
+from tests.support.colored_frames import CPU, train, write_split
 
 folder = Path(sys.argv[1])
 frames, labels = write_split(folder, "train", 40, 0)

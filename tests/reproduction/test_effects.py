@@ -224,7 +224,7 @@ def test_collected_with_effects_the_same_in_other_shards_and_workers(tmp_path):
     assert collect(mesh, one, "--effects", str(settings), "--depth") == 0
     apart = ("--sequence-frames", "7", "--workers", "2")
     assert collect(mesh, other, "--effects", str(settings), "--depth", *apart) == 0
-    found, again = ([path.read_bytes() for path in colour_files(out)] for out in (one, other))
+    found, again = ([path.read_bytes() for path in color_files(out)] for out in (one, other))
     assert found == again
     assert len(set(found)) == 32
     table = pd.read_csv(one / "train.effects.csv")
@@ -237,6 +237,6 @@ def test_collected_with_effects_the_same_in_other_shards_and_workers(tmp_path):
     assert main(["validate", str(one)]) == 0
 
 
-def colour_files(dataset):
+def color_files(dataset):
     sequences = [at for split in ("train", "test") for at in read_split(dataset, split)]
     return frame_paths(sequences, "color.png")

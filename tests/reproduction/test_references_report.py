@@ -31,7 +31,7 @@ from synfeal.dataset.packed import new_packed
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.records.files import write_json
 from synfeal.records.tables import read_frame, write_frame
-from tests.support.coloured_frames import answering, save
+from tests.support.colored_frames import answering, save
 from tests.support.report_results import experiment, metrics, write_run
 
 TABLE3 = "table3_inconsistencies"

@@ -52,7 +52,7 @@ def test_errors_of_colour_and_of_depth_where_both_hit_in_closed_form():
     expected = np.full((2, 4, 4, 3), 100.0, np.float32)
     rgb = np.full(expected.shape, 100, np.uint8)
     rgb[0, :2], rgb[1, :2] = 104, 96  # half the pixels are 4 levels off
-    found = speed.colour_errors(rgb, expected)
+    found = speed.color_errors(rgb, expected)
     assert found["mean_abs_error"] == pytest.approx(2.0)
     assert found["psnr_db"] == pytest.approx(20 * np.log10(255) - 10 * np.log10(8.0), abs=1e-3)
     expected = np.array([[1.0, 1.0, 1.0, 1.0, np.inf, 2.0]], np.float32)
@@ -184,7 +184,7 @@ def test_rows_and_figure_say_what_each_variant_is(made_up):
         (ring,) = (line for line in axes.lines if line.get_markersize() > 10)
         np.testing.assert_allclose(ring.get_xydata(), [point])
     curves = {line.get_color(): line for line in small.lines if line.get_linestyle() != "None"}
-    opengl, textures = curves[figures.COLOURS["opengl"]], curves[figures.ORANGE]
+    opengl, textures = curves[figures.COLORS["opengl"]], curves[figures.ORANGE]
     np.testing.assert_allclose(opengl.get_xydata(), [[4.0, 5.0], [8.0, 2.0]])
     np.testing.assert_allclose(textures.get_xydata(), [[8.0, 2.0], [7.0, 3.0]])
     assert {text.get_text() for text in small.texts} == {"1/4", "25%"}

@@ -89,8 +89,8 @@ def test_label_error_draws_known_errors_borders_and_assisted_batches(results):
         for bar in panels[2, 0].collections
         for box in [bar.get_paths()[0].get_extents()]
     ]
-    colours = [METHOD_STYLES[method]["color"].lower() for method in METHODS]
-    assert bars == [(0, 4, "#ffffff"), (4, 8, colours[0]), (0, 4, "#ffffff"), (4, 8, colours[1])]
+    colors = [METHOD_STYLES[method]["color"].lower() for method in METHODS]
+    assert bars == [(0, 4, "#ffffff"), (4, 8, colors[0]), (0, 4, "#ffffff"), (4, 8, colors[1])]
 
 
 def test_trajectories_draw_both_paths_and_ring_what_was_assisted(results):

@@ -33,8 +33,8 @@ def wall_with_doors(x0, x1, length_m, doors):
 def plain_part(meshes, rgb):
     """Boxes as one part of one plain colour."""
     whole = trimesh.util.concatenate(meshes)
-    colour = np.array([*rgb, 255], np.uint8)
-    return MeshPart("plain", np.asarray(whole.vertices), np.asarray(whole.faces), base_color=colour)
+    color = np.array([*rgb, 255], np.uint8)
+    return MeshPart("plain", np.asarray(whole.vertices), np.asarray(whole.faces), base_color=color)
 
 
 def apartment():
@@ -143,8 +143,8 @@ def fused_scan(spacing_m):
     is_hole |= (centre[:, 2] > high[2] - 1e-6) & (centre[:, 0] > -1.8)
     is_hole |= (centre[:, 0] > high[0] - 1e-6) & (centre[:, 1] < -0.6)
     rgb = np.clip(128 + 60 * waves + 45 * np.sin(6 * place[:, ::-1]), 0, 255).astype(np.uint8)
-    colours = np.column_stack([rgb, np.full(len(rgb), 255, np.uint8)])
-    scan = trimesh.Trimesh(place + 0.01 * waves, mesh.faces, vertex_colors=colours, process=False)
+    colors = np.column_stack([rgb, np.full(len(rgb), 255, np.uint8)])
+    scan = trimesh.Trimesh(place + 0.01 * waves, mesh.faces, vertex_colors=colors, process=False)
     scan.update_faces(~is_hole)
     scan.remove_unreferenced_vertices()
     return scan

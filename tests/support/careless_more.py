@@ -441,30 +441,30 @@ def no_depth_image(folder):
     _first(folder, "depth.png").unlink()
 
 
-def cut_colour(folder):
+def cut_color(folder):
     path = _first(folder, "color.png")
     path.write_bytes(path.read_bytes()[:-40])
 
 
-def empty_colour(folder):
+def empty_color(folder):
     _first(folder, "color.png").write_bytes(b"")
 
 
-def colour_of_another_size(folder):
+def color_of_another_size(folder):
     Image.new("RGB", (8, 8)).save(_first(folder, "color.png"))
 
 
-def colour_is_a_directory(folder):
+def color_is_a_directory(folder):
     _first(folder, "color.png").unlink()
     _first(folder, "color.png").mkdir()
 
 
-def colour_is_a_lost_link(folder):
+def color_is_a_lost_link(folder):
     _first(folder, "color.png").unlink()
     _first(folder, "color.png").symlink_to("/nowhere")
 
 
-def enormous_colour(folder):
+def enormous_color(folder):
     path = _first(folder, "color.png")
     content = bytearray(path.read_bytes())
     content[16:24] = (10**5).to_bytes(4, "big") * 2
@@ -546,12 +546,12 @@ DAMAGES = {
     damage: commands.split()
     for damage, commands in (
         (no_depth_image, "validate export map scan"),
-        (cut_colour, "validate preview train map"),
-        (empty_colour, "validate preview train map"),
-        (colour_of_another_size, "validate train map"),
-        (colour_is_a_directory, "validate preview export train map"),
-        (colour_is_a_lost_link, "validate preview train map"),
-        (enormous_colour, "validate preview train map"),
+        (cut_color, "validate preview train map"),
+        (empty_color, "validate preview train map"),
+        (color_of_another_size, "validate train map"),
+        (color_is_a_directory, "validate preview export train map"),
+        (color_is_a_lost_link, "validate preview train map"),
+        (enormous_color, "validate preview train map"),
         (depth_of_eight_bits, "validate export map"),
         (pose_of_text, "validate export map repeat"),
         (pose_of_three_rows, "validate export map"),

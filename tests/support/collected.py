@@ -16,9 +16,9 @@ def painted(mesh, rgb=None, seed=0, inwards=False):
     """A mesh of trimesh's whose corners all have one colour, or each another."""
     n = len(mesh.vertices)
     random = np.random.default_rng(seed).integers(0, 256, (n, 3), np.uint8)
-    colours = random if rgb is None else np.tile(np.array(rgb, np.uint8), (n, 1))
+    colors = random if rgb is None else np.tile(np.array(rgb, np.uint8), (n, 1))
     faces = np.asarray(mesh.faces)[:, :: -1 if inwards else 1]
-    return TexturedMesh((MeshPart("mesh", np.asarray(mesh.vertices), faces, vertex_rgb=colours),))
+    return TexturedMesh((MeshPart("mesh", np.asarray(mesh.vertices), faces, vertex_rgb=colors),))
 
 
 def save_room(path, seed=0):

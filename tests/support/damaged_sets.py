@@ -128,7 +128,7 @@ def _swap_middle(folder, *kinds):
         files[middle + 1].write_bytes(first)
 
 
-def swapped_colours(folder):
+def swapped_colors(folder):
     _swap_middle(folder, "color.png")
 
 
@@ -150,6 +150,6 @@ FOUND_BY = {
     depth_in_centimetres: "depth",
     depth_in_metres: "pairs",
     depth_along_the_ray: "depth",
-    swapped_colours: "colours",
+    swapped_colors: "colours",
     swapped_depths: "depth",
 }

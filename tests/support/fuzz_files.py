@@ -42,7 +42,7 @@ from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.listing import read_color, read_depth_mm
 from synfeal.validation.run import validate
 from tests.support import mesh_samples as meshes
-from tests.support.coloured_frames import save, untrained
+from tests.support.colored_frames import save, untrained
 from tests.support.damaged_sets import write_planar_set
 from tests.support.report_results import CONFIG, design_of, fill_assistance
 from tests.support.room_scene import straight_path

@@ -40,22 +40,22 @@ def mtl_lines(folder, part, index):
     return [*lines, f"map_Kd {name}"]
 
 
-def write_coloured_ply(path, mesh, spacing_m):
+def write_colored_ply(path, mesh, spacing_m):
     """PLY of a scene, with vertices at most ``spacing_m`` apart that carry its textures."""
-    pieces, colours = [], []
+    pieces, colors = [], []
     for part in mesh.parts:
         mapped = part if part.uv is not None else replace(part, uv=part.vertices_m[:, :2] * 0)
         corners = bisected(mapped, spacing_m)
         pieces.append(corners.reshape(-1, 5)[:, :3])
-        colours.append(vertex_colours(part, corners, spacing_m))
+        colors.append(vertex_colors(part, corners, spacing_m))
     points = np.concatenate(pieces)
     faces = np.arange(len(points)).reshape(-1, 3)
-    soup = trimesh.Trimesh(points, faces, vertex_colors=np.concatenate(colours), process=False)
+    soup = trimesh.Trimesh(points, faces, vertex_colors=np.concatenate(colors), process=False)
     path.write_bytes(soup.export(file_type="ply"))
     return path
 
 
-def vertex_colours(part, corners, spacing_m):
+def vertex_colors(part, corners, spacing_m):
     """Colours (N, 3): the texture averaged over about half a spacing around each corner."""
     if part.texture is None:
         return np.broadcast_to(part.base_color[:3], (3 * len(corners), 3)).copy()
@@ -67,8 +67,8 @@ def vertex_colours(part, corners, spacing_m):
     small = np.asarray(Image.fromarray(part.texture).resize(smaller, Image.Resampling.BOX), float)
     at = np.stack([1 - corners[..., 4].ravel() % 1, corners[..., 3].ravel() % 1]) - 1e-9
     where = at * np.array(small.shape[:2])[:, None] - 0.5
-    colours = [map_coordinates(small[..., c], where, order=1, mode="grid-wrap") for c in range(3)]
-    return np.round(np.stack(colours, axis=1) * (part.base_color[:3] / 255)).astype(np.uint8)
+    colors = [map_coordinates(small[..., c], where, order=1, mode="grid-wrap") for c in range(3)]
+    return np.round(np.stack(colors, axis=1) * (part.base_color[:3] / 255)).astype(np.uint8)
 
 
 def areas(corners):

@@ -144,8 +144,8 @@ def write_painted_gltf(path):
 
 
 def write_ply(path):
-    colours = np.full((3, 4), 99, np.uint8)
-    mesh = trimesh.Trimesh(TRIANGLE, FACE, vertex_colors=colours)
+    colors = np.full((3, 4), 99, np.uint8)
+    mesh = trimesh.Trimesh(TRIANGLE, FACE, vertex_colors=colors)
     path.write_bytes(mesh.export(file_type="ply", encoding="ascii"))
 
 

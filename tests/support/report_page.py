@@ -61,9 +61,9 @@ def page_results(root):
 def write_scene(root):
     """A red box to look into from above, and one straight path per split."""
     box = trimesh.creation.box((4.0, 3.0, 2.0))
-    colours = np.tile(np.array(RED, np.uint8), (8, 1))
+    colors = np.tile(np.array(RED, np.uint8), (8, 1))
     vertices_m = np.asarray(box.vertices) + np.array([2.0, 1.5, 1.0])
-    part = MeshPart("room", vertices_m, np.asarray(box.faces)[:, ::-1], vertex_rgb=colours)
+    part = MeshPart("room", vertices_m, np.asarray(box.faces)[:, ::-1], vertex_rgb=colors)
     save_glb(root / "scenes" / "large_room" / "mesh.glb", TexturedMesh((part,)))
     for split, ends_m in PLANS.items():
         write_pose_table(root / "plans" / "large_room" / f"{split}.csv", straight(ends_m))

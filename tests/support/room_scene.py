@@ -117,7 +117,7 @@ def _slabs(origin, direction, lower, upper):
     return at.min(axis=0).max(axis=-1), at.max(axis=0).min(axis=-1)
 
 
-def colour_of(point, room):
+def color_of(point, room):
     """Colour (H, W, 3) uint8 of points (H, W, 3)."""
     if room.plain:
         return np.full(point.shape, 230, dtype=np.uint8)
@@ -135,7 +135,7 @@ def write_room(folder, poses, room=FURNISHED, camera=CAMERA, supersampling=1):
     for frame, pose in enumerate(poses):
         color_paths.append(folder / f"frame-{frame:06d}.color.png")
         depth_paths.append(folder / f"frame-{frame:06d}.depth.png")
-        image = Image.fromarray(colour_of(cast(pose, room, finer(camera, supersampling))[1], room))
+        image = Image.fromarray(color_of(cast(pose, room, finer(camera, supersampling))[1], room))
         image.reduce(supersampling).save(color_paths[-1])
         depth_mm = np.round(1000 * cast(pose, room, camera)[0]).astype(np.uint16)
         Image.fromarray(depth_mm).save(depth_paths[-1])

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from synfeal.config.dataset import RenderConfig
-from synfeal.mesh.atlas import texel_size_m, with_baked_colours
+from synfeal.mesh.atlas import texel_size_m, with_baked_colors
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.triangles import with_fewer_faces
 from synfeal.render import open_renderer
@@ -47,7 +47,7 @@ def views():
 def test_few_triangles_show_the_colours_of_many(cave):
     pytest.importorskip("meshoptimizer")
     reduced = with_fewer_faces(TexturedMesh((cave,)), len(cave.faces) // 32).parts[0]
-    baked = with_baked_colours(reduced, cave, texel_size_m(cave))
+    baked = with_baked_colors(reduced, cave, texel_size_m(cave))
     assert len(baked.faces) == len(reduced.faces)
     truth = drawn(cave, views())
     plain, textured = (np.abs(drawn(part, views()) - truth).mean() for part in (reduced, baked))
@@ -56,7 +56,7 @@ def test_few_triangles_show_the_colours_of_many(cave):
 
 
 def test_triangles_stay_where_they_are_and_colours_are_those_of_their_places(cave):
-    baked = with_baked_colours(cave, cave, texel_size_m(cave))
+    baked = with_baked_colors(cave, cave, texel_size_m(cave))
     np.testing.assert_array_equal(baked.vertices_m[baked.faces], cave.vertices_m[cave.faces])
     assert baked.uv is not None
     assert baked.texture is not None
@@ -73,7 +73,7 @@ def test_triangles_stay_where_they_are_and_colours_are_those_of_their_places(cav
 
 
 def test_baking_is_the_same_each_time(cave):
-    first, second = (with_baked_colours(cave, cave, 0.05) for _ in range(2))
+    first, second = (with_baked_colors(cave, cave, 0.05) for _ in range(2))
     np.testing.assert_array_equal(first.texture, second.texture)
     np.testing.assert_array_equal(first.uv, second.uv)
 
@@ -100,21 +100,21 @@ def test_the_back_of_a_thin_sheet_does_not_shine_through():
         np.concatenate([sheets[0][1], sheets[1][1] + count]),
         vertex_rgb=np.concatenate([s[2] for s in sheets]),
     )
-    baked = with_baked_colours(part, part, 0.05)
+    baked = with_baked_colors(part, part, 0.05)
     behind = LOOK_ALONG_X.copy()
     behind[:3, :3] = LOOK_ALONG_X[:3, :3] @ np.diag([-1.0, 1.0, -1.0])
     behind[:3, 3] = [4.03, 0.0, 0.0]
     near = camera_of(width=80, height=60, horizontal_fov_deg=40)
-    for pose, colour in ((LOOK_ALONG_X, red), (behind, blue)):
+    for pose, color in ((LOOK_ALONG_X, red), (behind, blue)):
         np.testing.assert_allclose(
-            drawn(baked, [pose], near)[0], np.full((60, 80, 3), colour), atol=2
+            drawn(baked, [pose], near)[0], np.full((60, 80, 3), color), atol=2
         )
 
 
 def test_a_mesh_far_from_the_origin_is_baked_alike(cave):
     offset = np.array([4096.0, -8192.0, 128.0])  # of binary fractions: sums are exact enough
     moved = replace(cave, vertices_m=cave.vertices_m + offset)
-    here, there = (with_baked_colours(part, part, 0.05) for part in (cave, moved))
+    here, there = (with_baked_colors(part, part, 0.05) for part in (cave, moved))
     assert here.texture is not None
     assert there.texture is not None
     assert np.abs(here.texture.mean() - there.texture.mean()) < 1.0

@@ -7,7 +7,7 @@ import pytest
 from synfeal.cli import main
 from tests import CONFIG
 from tests.support.careless import TABLE, arguments_of, make_folder
-from tests.support.coloured_frames import save, untrained
+from tests.support.colored_frames import save, untrained
 from tests.support.fuzzing import JARGON, TooSlow, at_most, tree
 
 SECONDS = 20.0

@@ -7,7 +7,7 @@ import pytest
 
 from tests import CONFIG
 from tests.support.careless_more import COMMANDS, DAMAGES, FILES, LATER, ON_SETS, make_more
-from tests.support.coloured_frames import save, untrained
+from tests.support.colored_frames import save, untrained
 from tests.support.fuzzing import tree
 from tests.synfeal.test_careless import problem_with
 

@@ -184,7 +184,7 @@ def test_the_functions_make_what_the_command_makes(mesh, calm, tmp_path):
     with pytest.raises(InputError, match=r"^--spacing: "):
         synfeal.plan(mesh, 10, spacing=-1)
     with pytest.raises(InputError, match=r"^colour: no such option"):
-        synfeal.plan(mesh, 10, colour="red")
+        synfeal.plan(mesh, 10, color="red")
 
 
 def loaded_by(code, among):

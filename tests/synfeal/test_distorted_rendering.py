@@ -47,14 +47,14 @@ def pixel_centres(camera):
 class Analytic:
     """A scene in closed form: colour and depth as functions of normalised image coordinates."""
 
-    def __init__(self, camera, colour=None, depth=None, samples=4):
-        self.camera, self.colour, self.depth, self.samples = camera, colour, depth, samples
+    def __init__(self, camera, color=None, depth=None, samples=4):
+        self.camera, self.color, self.depth, self.samples = camera, color, depth, samples
 
     def render(self, world_from_cam):
         steps = (np.arange(self.samples) + 0.5) / self.samples - 0.5
         centre, total = pixel_centres(self.camera), 0.0
         for offset in np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2):
-            total = total + self.colour(normalised_of_pixels(self.camera, centre + offset))
+            total = total + self.color(normalised_of_pixels(self.camera, centre + offset))
         grey = np.rint(total / self.samples**2).astype(np.uint8)
         return np.repeat(grey[..., None], 3, axis=2)
 
@@ -64,7 +64,7 @@ class Analytic:
         return black, self.depth(normalised).astype(np.float32)
 
 
-def noise_colour(normalised):
+def noise_color(normalised):
     row_column = np.moveaxis(240 * normalised[..., ::-1], -1, 0)
     return map_coordinates(NOISE, row_column, order=1, mode="wrap")
 
@@ -98,8 +98,8 @@ def test_points_appear_where_opencv_projects_them(lens):
 @each_lens
 def test_colours_are_nearly_those_of_64_rays(lens):
     camera = camera_of(lens)
-    expected = Analytic(camera, noise_colour, samples=8).render(AHEAD).astype(float)
-    found = DistortedRenderer(lambda pinhole: Analytic(pinhole, noise_colour), camera).render(AHEAD)
+    expected = Analytic(camera, noise_color, samples=8).render(AHEAD).astype(float)
+    found = DistortedRenderer(lambda pinhole: Analytic(pinhole, noise_color), camera).render(AHEAD)
     error = found - expected
     assert np.sqrt((error**2).mean()) < 0.03 * expected.std()
     assert abs(error.mean()) < 0.1

@@ -52,7 +52,7 @@ def test_files_and_numbers_are_those_of_the_room_and_what_is_printed_can_be_past
     assert facts["properties"]["volume_m3"] == pytest.approx(90.0)
     assert facts["topology"]["watertight"] is True
     assert facts["topology"]["enclosed_volume_m3"] == pytest.approx(-90.0)
-    assert facts["detail"]["area_m2"]["coloured_by_vertex"] == pytest.approx(126.0)
+    assert facts["detail"]["area_m2"]["colored_by_vertex"] == pytest.approx(126.0)
     assert facts["free_space"]["box_m"] == [[-2.9, -2.5, -1.5], [2.9, 2.5, 1.5]]
     assert facts["free_space"]["volume_m3"] == pytest.approx(5.8 * 5.0 * 3.0, rel=0.03)
     assert facts["mesh"]["sha256"] == hashlib.sha256(mesh.read_bytes()).hexdigest()

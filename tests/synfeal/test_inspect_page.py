@@ -97,8 +97,8 @@ def test_the_copy_lies_where_the_mesh_does_in_its_colours_without_what_is_cut_ou
     side = np.asarray(front.face_normals)[:, 1]
     parts = []
     for sign, rgb in ((1, (255, 0, 0)), (-1, (0, 0, 255))):
-        faces, colour = front.faces[side * sign > 0.5], np.array([*rgb, 255], np.uint8)
-        parts.append(MeshPart("side", np.asarray(front.vertices), faces, base_color=colour))
+        faces, color = front.faces[side * sign > 0.5], np.array([*rgb, 255], np.uint8)
+        parts.append(MeshPart("side", np.asarray(front.vertices), faces, base_color=color))
     copy = small_copy(TexturedMesh(tuple(parts)))
     y = copy.positions[:, 1]
     assert (copy.rgb[y > 0] == [255, 0, 0]).all()
@@ -151,11 +151,11 @@ def test_the_page_needs_nothing_else_and_escapes_what_it_shows():
     assert page.count("</script>") == 2  # the mesh and the viewer
     found = re.search(r'<script id="scene" type="application/json">(.*?)</script>', page)
     scene = json.loads(found[1])
-    assert scene["polylines"] == [{"points": line.tolist(), "colour": [0, 255, 0]}]
+    assert scene["polylines"] == [{"points": line.tolist(), "color": [0, 255, 0]}]
     positions = np.frombuffer(base64.b64decode(scene["positions"]), "<i2").reshape(-1, 3)
     faces = np.frombuffer(base64.b64decode(scene["faces"]), "<u4")
     assert faces.max() == len(positions) - 1
-    assert len(base64.b64decode(scene["colours"])) == 3 * len(positions)
+    assert len(base64.b64decode(scene["colors"])) == 3 * len(positions)
 
 
 class Reply(HTTPServer):

@@ -17,7 +17,7 @@ from synfeal.inspect.boxes import (
     suggest_box,
     suggest_boxes,
 )
-from synfeal.inspect.doubts import colour_doubts, doubts_of, floor_areas_m2, load_as_meant
+from synfeal.inspect.doubts import color_doubts, doubts_of, floor_areas_m2, load_as_meant
 from synfeal.inspect.facts import detail_of, texels_per_m
 from synfeal.inspect.freespace import (
     FreeSpace,
@@ -197,12 +197,12 @@ def test_texels_and_colours_of_squares():
         TexturedMesh((square(1.0, texture_of(8, 8)), square(2.0, vertex_rgb=rgb), square(3.0)))
     )
     assert detail["area_m2"] == pytest.approx(
-        {"textured": 1.0, "coloured_by_vertex": 4.0, "plain": 9.0}
+        {"textured": 1.0, "colored_by_vertex": 4.0, "plain": 9.0}
     )
-    assert detail["coloured_vertices_per_m"] == pytest.approx(1.0)  # 4 vertices on 4 m²
+    assert detail["colored_vertices_per_m"] == pytest.approx(1.0)  # 4 vertices on 4 m²
     bare = detail_of(TexturedMesh((square(1.0),)))
     assert bare["texels_per_m"] is None
-    assert bare["coloured_vertices_per_m"] is None
+    assert bare["colored_vertices_per_m"] is None
     texture = np.arange(4, dtype=np.uint8).reshape(2, 2, 1)  # 0 1 above 2 3
     uv = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [1.75, -0.25], [0.0, 0.0], [1.0, 1.0]])
     assert nearest_texels(texture, uv)[:, 0].tolist() == [2, 3, 0, 1, 2, 2]
@@ -266,11 +266,11 @@ def test_a_unit_is_assumed_only_where_it_makes_a_room(tmp_path, side, taken):
 
 
 def test_plain_and_open_meshes_are_doubted_and_a_flat_floor_is_a_floor():
-    plain = {"textured": 1.0, "coloured_by_vertex": 0.0, "plain": 3.0}
+    plain = {"textured": 1.0, "colored_by_vertex": 0.0, "plain": 3.0}
     two = (square(1.0, vertex_rgb=np.eye(4, 3, dtype=np.uint8) * 255), square(2.0))
-    assert "75%" in colour_doubts(TexturedMesh(two), plain)[0]
-    assert "of one colour" in colour_doubts(TexturedMesh(two[1:]), plain)[0]
-    assert not colour_doubts(TexturedMesh(two), {**plain, "plain": 0.5})
+    assert "75%" in color_doubts(TexturedMesh(two), plain)[0]
+    assert "of one colour" in color_doubts(TexturedMesh(two[1:]), plain)[0]
+    assert not color_doubts(TexturedMesh(two), {**plain, "plain": 0.5})
     assert "25%" in doubts((5.0, 5.0, 3.0), space=closed_space(0.75))
     points = np.column_stack([np.random.default_rng(0).random((100, 2)), np.zeros(100)])
     normals = np.tile([0.0, 0.0, -1.0], (100, 1))

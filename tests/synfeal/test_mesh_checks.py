@@ -104,10 +104,10 @@ def test_surfaces_open_and_non_manifold_are_kept_and_duplicates_removed(tmp_path
     np.testing.assert_array_equal(part.uv, uv[1:4])
     assert findings == ("part 'wall': 2 unused vertices removed",)
     # Three walls that meet in one edge: non-manifold there, open everywhere else.
-    colours = np.array([[255, 0, 0, 255]] * 4 + [[0, 255, 0, 255]], np.uint8)
+    colors = np.array([[255, 0, 0, 255]] * 4 + [[0, 255, 0, 255]], np.uint8)
     vertices = np.array([[0.0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, -1, 0]])
     faces = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
-    trimesh.Trimesh(vertices, faces, vertex_colors=colours, process=False).export(
+    trimesh.Trimesh(vertices, faces, vertex_colors=colors, process=False).export(
         tmp_path / "walls.ply"
     )
     mesh = load_mesh(tmp_path / "walls.ply")

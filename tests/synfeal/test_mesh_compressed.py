@@ -58,10 +58,10 @@ def write_meshopt(gltf):
     plain, count, views = gltf.binary, len(VERTICES), gltf.header["bufferViews"]
     contents = [plain[v["byteOffset"] : v["byteOffset"] + v["byteLength"]] for v in views]
     gltf.binary, gltf.header["bufferViews"] = b"", []
-    position, colour = (np.frombuffer(part, np.uint8).reshape(count, -1) for part in contents[:2])
+    position, color = (np.frombuffer(part, np.uint8).reshape(count, -1) for part in contents[:2])
     encoded = [
         (encode_vertex_buffer(position), count, 8, "ATTRIBUTES"),
-        (encode_vertex_buffer(colour), count, 4, "ATTRIBUTES"),
+        (encode_vertex_buffer(color), count, 4, "ATTRIBUTES"),
         (encode_index_buffer(FACES.ravel()), FACES.size, 2, "TRIANGLES"),
     ]
     for view, (data, n, stride, mode) in zip(views, encoded, strict=True):

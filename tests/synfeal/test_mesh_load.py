@@ -128,8 +128,8 @@ def test_obj_with_one_material_and_with_several(tmp_path):
         "usemtl red\nf 1 2 3\nusemtl blue\nf -3 -1 -2\nusemtl red\nf 1 2 4\n"
     )
     parts = load_mesh(tmp_path / "two.obj").parts
-    colours = {tuple(part.base_color[:3]): len(part.faces) for part in parts}
-    assert colours == {(255, 0, 0): 2, (0, 0, 255): 1}
+    colors = {tuple(part.base_color[:3]): len(part.faces) for part in parts}
+    assert colors == {(255, 0, 0): 2, (0, 0, 255): 1}
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "binary"])
@@ -174,8 +174,8 @@ def test_ply_with_texture_and_with_face_colours(tmp_path, paint):
     box.visual.face_colors = np.arange(48).reshape(12, 4).astype(np.uint8)
     box.export(tmp_path / "box.ply")
     part = load_mesh(tmp_path / "box.ply").parts[0]
-    for face, colour in zip(part.faces, box.visual.face_colors, strict=True):
-        assert (part.vertex_rgb[face] == colour[:3]).all()
+    for face, color in zip(part.faces, box.visual.face_colors, strict=True):
+        assert (part.vertex_rgb[face] == color[:3]).all()
 
 
 HEADER_ONLY = b'{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {}}]}]}'

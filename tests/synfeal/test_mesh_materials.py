@@ -20,12 +20,12 @@ from tests.support.mesh_samples import (
     write_obj,
 )
 
-COLOURS = np.array([[1, 2, 3, 4]] * 3, np.uint8)
+COLORS = np.array([[1, 2, 3, 4]] * 3, np.uint8)
 
 
-def plain(*colour):
+def plain(*color):
     """An image of one colour, grey with alpha or what else its number of channels says."""
-    return Image.new({2: "LA", 3: "RGB", 4: "RGBA"}[len(colour)], (2, 2), colour)
+    return Image.new({2: "LA", 3: "RGB", 4: "RGBA"}[len(color)], (2, 2), color)
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def painted(tmp_path):
 def test_gltf_names_missing_and_broken_textures_and_what_depends_on_them(tmp_path, caplog):
     material = textured({"normalTexture": {"index": 1}, "alphaMode": "BLEND"})
     gltf = triangle_gltf(material, ["wall.png", "bumps.png"])
-    gltf.add("COLOR_0", COLOURS)
+    gltf.add("COLOR_0", COLORS)
     with caplog.at_level(logging.WARNING, "synfeal"):
         findings = load_mesh(gltf.store(tmp_path)).findings
     assert len(findings) == 3
@@ -160,7 +160,7 @@ def test_texture_coordinates_are_transformed_chosen_and_missed(painted):
 
     def without(gltf):
         del gltf.primitive["attributes"]["TEXCOORD_0"]
-        gltf.add("COLOR_0", COLOURS)
+        gltf.add("COLOR_0", COLORS)
 
     mesh = painted(plain(0, 0, 0), textured(), without)
     assert mesh.parts[0].texture is None

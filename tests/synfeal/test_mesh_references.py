@@ -165,7 +165,7 @@ def test_instances_are_counted(tmp_path, monkeypatch):
         load_mesh(gltf.store(tmp_path))
 
 
-def png_of_one_colour(width, height):
+def png_of_one_color(width, height):
     """A PNG bomb: rows of zeros."""
 
     def chunk(kind, data):
@@ -182,7 +182,7 @@ def png_of_one_colour(width, height):
 
 @pytest.mark.parametrize("write", [gltf_image, obj_texture, ply_texture])
 def test_a_texture_that_claims_too_much_is_left_out(write, tmp_path, caplog):
-    (tmp_path / "wall.png").write_bytes(png_of_one_colour(100_000, 100_000))
+    (tmp_path / "wall.png").write_bytes(png_of_one_color(100_000, 100_000))
     path = write(tmp_path, "wall.png")
     with little_memory(), suppress(InputError):  # nothing else colours it
         load_mesh(path)
@@ -195,7 +195,7 @@ def test_an_image_that_claims_too_much_is_refused_without_a_warning(read, tmp_pa
     """Python warns of images a little smaller than those that Pillow itself refuses."""
     path = tmp_path / "frame.png"
     for side in (100_000, 12_000):
-        path.write_bytes(png_of_one_colour(side, side))
+        path.write_bytes(png_of_one_color(side, side))
         line = refused_with_little_memory(lambda: read(path), r"frame\.png")
         assert "\n" not in line
 

@@ -32,7 +32,7 @@ from tests.support.bare_places import (
     write_scan,
     write_temple,
 )
-from tests.support.mesh_conversions import write_coloured_ply, write_obj_scene
+from tests.support.mesh_conversions import write_colored_ply, write_obj_scene
 from tests.support.small_room import SIDES, TWO, paint
 
 Corners = tuple[float, float, float]
@@ -105,7 +105,7 @@ def hollow_walls(folder):
 def no_ceiling(folder):
     """A scan with vertex colours, as PLY."""
     mesh = TexturedMesh(tuple(walls((-3, -2, 0), (3, 2.5, 2.7), "wesnf", 0.1) + furniture(-2, -1)))
-    write_coloured_ply(folder / "no_ceiling.ply", mesh, 0.2)
+    write_colored_ply(folder / "no_ceiling.ply", mesh, 0.2)
     return Varied(folder / "no_ceiling.ply", inside((-3, -2, 0), (3, 2.5, 2.7)))
 
 

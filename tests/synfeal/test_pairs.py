@@ -420,8 +420,8 @@ def write_frames_of_wall(folder, sequences, camera=FACING):
         listed.append(Sequence(directory.name, split, 0, len(frames)))
         for index, (pose, depth_mm) in enumerate(frames):
             stem = directory / f"frame-{index:06d}"
-            colour = np.zeros((*depth_mm.shape, 3), np.uint8)
-            stem.with_suffix(".color.png").write_bytes(encode_png(colour))
+            color = np.zeros((*depth_mm.shape, 3), np.uint8)
+            stem.with_suffix(".color.png").write_bytes(encode_png(color))
             stem.with_suffix(".depth.png").write_bytes(encode_png(depth_mm))
             stem.with_suffix(".pose.txt").write_text(pose_text(pose))
     write_splits(folder, listed)

@@ -172,9 +172,9 @@ def test_vertex_colours_are_interpolated_and_multiplied(seen):
 def test_alpha_below_the_cutoff_lets_the_wall_behind_through(seen):
     leaf = np.full((32, 32, 4), (0, 255, 0, 255), np.uint8)
     leaf[:, 16:] = (255, 255, 255, 150)  # right half: alpha 0.59
-    for cutoff, colour, distance in ((0.7, [255, 0, 0], 2.0), (0.5, [255, 255, 255], 1.0)):
+    for cutoff, color, distance in ((0.7, [255, 0, 0], 2.0), (0.5, [255, 255, 255], 1.0)):
         rgb, depth = seen(facing_quad(1.0, 3.0, leaf, alpha_cutoff=cutoff), WALL)
-        assert rgb[24, [8, 56]].tolist() == [[0, 255, 0], colour]
+        assert rgb[24, [8, 56]].tolist() == [[0, 255, 0], color]
         assert depth[24, 56] == pytest.approx(distance, abs=1e-3)
     faint = np.array([255, 255, 255, 100], np.uint8)  # 0.39: of the base colour, which counts too
     for values in ({"texture": leaf, "base_color": faint}, {"base_color": faint // 5}):

@@ -21,7 +21,7 @@ from tests.support.damaged_sets import (
     depth_in_centimetres,
     depth_in_metres,
     frame_files,
-    swapped_colours,
+    swapped_colors,
     swapped_frames,
     without_manifest_hashes,
 )
@@ -184,7 +184,7 @@ def small_random(tmp_path_factory):
         (depth_in_metres, {"images", "pairs"}),
         (depth_in_centimetres, {"pairs"}),
         (swapped_frames, {"depth", "surfaces"}),
-        (swapped_colours, {"colours"}),
+        (swapped_colors, {"colours"}),
     ],
 )
 def test_independent_poses_are_told_right_from_wrong_in_small_images(
@@ -198,7 +198,7 @@ def test_independent_poses_are_told_right_from_wrong_in_small_images(
     assert {name for name, line in found.items() if " FAILED " in line} == failing
 
 
-def of_one_colour(grey):
+def of_one_color(grey):
     def change(folder, count):
         for path in frame_files(folder, "color.png")[:count]:
             Image.new("RGB", (96, 72), (grey,) * 3).save(path)
@@ -216,9 +216,9 @@ def two_thirds_without_depth(folder, count):
 @pytest.mark.parametrize(
     ("change", "count", "words"),
     [
-        (of_one_colour(0), 24, ["of one colour", "24 of 32", "frame-000000.color.png"]),
-        (of_one_colour(102), 24, ["of one colour", "24 of 32"]),
-        (of_one_colour(102), 1, []),
+        (of_one_color(0), 24, ["of one colour", "24 of 32", "frame-000000.color.png"]),
+        (of_one_color(102), 24, ["of one colour", "24 of 32"]),
+        (of_one_color(102), 1, []),
         (two_thirds_without_depth, 24, ["more than half empty", "24 of 32"]),
         (two_thirds_without_depth, 8, []),
     ],

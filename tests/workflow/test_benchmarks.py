@@ -14,7 +14,7 @@ from benchmarks.__main__ import SWEEPS
 from benchmarks.page import mark_front
 from benchmarks.sweep import read_sweep, runs_of
 from tests import ROOT
-from tests.support.coloured_frames import write_split
+from tests.support.colored_frames import write_split
 
 pytestmark = pytest.mark.slow
 RATE = "localizers.posenet2.learning_rate"

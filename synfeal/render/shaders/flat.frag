@@ -19,27 +19,27 @@ in vec2 uv_0;
 #ifdef COLOR_0_LOC
 in vec4 color_multiplier;
 #endif
-layout(location = 0) out vec4 colour;
+layout(location = 0) out vec4 color;
 layout(location = 1) out vec4 depth_m;
 layout(location = 2) out vec4 halves;
 
 void main()
 {
-    colour = material.base_color_factor;
+    color = material.base_color_factor;
     if (floor_share < 1.0) {
         vec3 normal = cross(dFdx(from_camera), dFdy(from_camera));
         float cosine = abs(dot(normal, from_camera));
         cosine /= max(length(normal) * length(from_camera), 1e-30);
-        colour.rgb *= mix(floor_share, 1.0, min(cosine, 1.0));
+        color.rgb *= mix(floor_share, 1.0, min(cosine, 1.0));
     }
 #ifdef HAS_BASE_COLOR_TEX
     vec4 texel = texture(material.base_color_texture, uv_0, level_bias);
     if (texel.a < 0.5)
         discard;
-    colour.rgb *= texel.rgb;
+    color.rgb *= texel.rgb;
 #endif
 #ifdef COLOR_0_LOC
-    colour.rgb *= color_multiplier.rgb;
+    color.rgb *= color_multiplier.rgb;
 #endif
     depth_m = vec4(1.0 / gl_FragCoord.w);
     int number = first_face + gl_PrimitiveID + 1;

@@ -1,11 +1,11 @@
-// With TEXTURED, COLOURED, or both; HEADLIGHT for a lamp at the camera.
+// With TEXTURED, COLORED, or both; HEADLIGHT for a lamp at the camera.
 uniform mat4 clip_from_mesh;
 in vec3 position;
 #ifdef TEXTURED
 in vec2 corner_uv;
 out vec2 uv;
 #endif
-#ifdef COLOURED
+#ifdef COLORED
 in vec3 corner_rgb;
 out vec3 rgb;
 #endif
@@ -20,7 +20,7 @@ void main() {
 #ifdef TEXTURED
     uv = corner_uv;
 #endif
-#ifdef COLOURED
+#ifdef COLORED
     rgb = corner_rgb;
 #endif
     gl_Position = clip_from_mesh * vec4(position, 1.0);

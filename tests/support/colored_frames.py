@@ -18,7 +18,7 @@ PX = NETWORK.input_px
 CPU = torch.device("cpu")
 
 
-def coloured_frames(count, rng):
+def colored_frames(count, rng):
     """Frames whose colour is the position and whose gradient is the yaw, with a little noise."""
     position_m = rng.uniform(-1, 1, (count, 3))
     yaw = rng.uniform(-0.5, 0.5, count)
@@ -33,7 +33,7 @@ def coloured_frames(count, rng):
 
 def write_split(folder, name, count, seed, spare=0):
     """Packed frames, ``spare`` of them without a label, and labels."""
-    images, table = coloured_frames(count + spare, np.random.default_rng(seed))
+    images, table = colored_frames(count + spare, np.random.default_rng(seed))
     np.save(folder / f"{name}.npy", images)
     write_pose_table(folder / f"{name}.csv", table.first(count))
     return folder / f"{name}.npy", folder / f"{name}.csv"
