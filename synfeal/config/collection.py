@@ -203,9 +203,9 @@ class CollectionConfig(Strict):
     min_path_m: NonNegative = Field(1.5, description="shorter paths are drawn again")
     test_paths: Annotated[int, Field(ge=1, le=10**6)] | None = Field(
         None,
-        description="mode `path`: least number of paths that the largest test set is of, each cut"
-        " short; a smaller set has the first of them; null: whole paths, as in the paper, of which"
-        " few frames show one or two",
+        description="mode `path`: least number of paths that the largest test set is of, every k-th"
+        " frame of whole ones; a smaller set has the first of them; null: all frames of each path,"
+        " as in the paper, so that few frames show one or two paths",
     )
     max_tries: int = Field(2000, ge=1, le=10**6, description="rounds until a scene is too narrow")
     interpolation: Literal["rpy", "slerp"] = Field(

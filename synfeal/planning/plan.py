@@ -116,11 +116,11 @@ def plan_split(
 ) -> PoseTable:
     """Plan the poses of a split by ``collection.mode``.
 
-    ``path``: connected straight paths; the last may be cut short, and all of the test split where
-    ``collection.test_paths`` asks for more paths than whole ones would give. ``random``:
-    independent admissible poses, each a path of its own. ``repeat``: the poses of an earlier data
-    set. Every box has paths of its own, and frames in proportion to its volume in every prefix of
-    the plan.
+    ``path``: connected straight paths; the last may be cut short. Where ``collection.test_paths``
+    asks for more paths than whole ones would give, the test split takes every k-th frame of whole
+    paths. ``random``: independent admissible poses, each a path of its own. ``repeat``: the poses
+    of an earlier data set. Every box has paths of its own, and frames in proportion to its volume
+    in every prefix of the plan.
 
     Args:
         caster: Rays against the collision mesh.
@@ -163,11 +163,9 @@ def plan_split(
     ]
     if collection.mode == "random":
         vectors = _independent(spaces, _Turns(boxes), collection, n_frames)
-        return _table(list(poses_of(vectors)[:, None]), n_frames)
-    longest = None
-    if split == "test" and collection.test_paths is not None:
-        longest = max(1, n_frames // collection.test_paths)
-    return _table(_paths(spaces, _Turns(boxes), collection, n_frames, longest), n_frames)
+        return _pose_table(poses_of(vectors), np.arange(n_frames))
+    n_paths = collection.test_paths if split == "test" else None
+    return _thinned(_paths(spaces, _Turns(boxes), collection), n_frames, n_paths or 0)
 
 
 def _independent(
@@ -184,32 +182,39 @@ def _independent(
 
 
 def _paths(
-    spaces: Sequence[PoseSpace],
-    turns: _Turns,
-    collection: CollectionConfig,
-    n_frames: int,
-    longest: int | None,
-) -> list[Array]:
-    """Plan paths, space after space.
+    spaces: Sequence[PoseSpace], turns: _Turns, collection: CollectionConfig
+) -> Iterator[Array]:
+    """Yield whole paths (n, 4, 4) without end, each in the space whose turn it is."""
+    walks = [_walk(space, collection) for space in spaces]
+    while True:
+        index = turns.next(0)
+        path = next(walks[index])
+        turns.made[index] += len(path)
+        yield path
+
+
+def _thinned(paths: Iterator[Array], n_frames: int, n_paths: int) -> PoseTable:
+    """Tabulate every k-th frame of whole paths, with the smallest k that reaches enough of them.
+
+    Frames are counted through all paths, so that none favours where paths begin or end: those are
+    waypoints, which lie nearer to the faces of the box than the frames between.
 
     Args:
-        spaces: Where they lie.
-        turns: Decides which space the next path is in.
-        collection: How the camera moves.
-        n_frames: Least number of frames of all paths together.
-        longest: Frames of a path that are kept, its first ones; None keeps all. The next path
-            begins where the whole one ended.
-
-    Returns:
-        Poses (n, 4, 4) of each path.
+        paths: Poses (n, 4, 4) of one path after another.
+        n_frames: Number of frames to return.
+        n_paths: Least number of paths they are to be of; 0 asks for none, and gives all frames.
     """
-    walks = [_walk(space, collection) for space in spaces]
-    paths: list[Array] = []
-    while turns.total < n_frames:
-        index = turns.next(0)
-        paths.append(next(walks[index])[:longest])
-        turns.made[index] += len(paths[-1])
-    return paths
+    taken: list[Array] = []
+    total = 0
+    every, least = 1, min(n_paths, n_frames)
+    while True:
+        while total < every * n_frames or len(taken) < least:
+            taken.append(next(paths))
+            total += len(taken[-1])
+        path = np.repeat(np.arange(len(taken)), [len(one) for one in taken])[::every][:n_frames]
+        if len(np.unique(path)) >= least:
+            return _pose_table(np.concatenate(taken)[::every][:n_frames], path)
+        every = max(every + 1, total // n_frames)
 
 
 class _Turns:
@@ -277,8 +282,6 @@ def _or_clearance(space: PoseSpace) -> str:
     return f" or min_clearance_m ({space.clearance.min_clearance_m} m)"
 
 
-def _table(paths: list[Array], n_frames: int) -> PoseTable:
-    """Tabulate the first ``n_frames`` poses of consecutive paths (n, 4, 4)."""
-    poses = np.concatenate(paths)[:n_frames]
-    index = np.repeat(np.arange(len(paths)), [len(path) for path in paths])[:n_frames]
-    return PoseTable(np.arange(n_frames), index, poses[:, :3, 3].copy(), quat_wxyz_of(poses))
+def _pose_table(poses: Array, path: NDArray[np.int64]) -> PoseTable:
+    """Tabulate poses (n, 4, 4) by the index (n,) of the path that each is of."""
+    return PoseTable(np.arange(len(poses)), path, poses[:, :3, 3].copy(), quat_wxyz_of(poses))

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from scipy.stats import ks_2samp
 
 from synfeal.config.collection import Angles, Box, CollectionConfig
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
@@ -67,8 +68,8 @@ def test_plan_has_the_frames_asked_for_on_free_connected_paths(furnished):
 
 
 @pytest.mark.parametrize("n_frames", [5, 8, 60, 400])
-def test_test_frames_are_the_first_of_paths_that_whole_ones_would_be(furnished, n_frames):
-    """Each path is that of the plan without a bound, cut short: so none is planned differently."""
+def test_test_frames_are_every_kth_of_the_paths_that_all_frames_would_be(furnished, n_frames):
+    """The paths are those of the plan without a bound: so none is planned differently."""
     whole = CollectionConfig(max_tries=300, frame_spacing_m=0.05, min_path_m=1.0)
     spread = whole.model_copy(update={"test_paths": 8})
 
@@ -79,11 +80,46 @@ def test_test_frames_are_the_first_of_paths_that_whole_ones_would_be(furnished, 
     table, full = planned(spread, n_frames), planned(whole, 4000)
     assert len(table) == n_frames
     assert len(np.unique(table.path)) >= min(8, n_frames)
-    for path in np.unique(table.path):
-        own, first = table.path == path, full.position_m[full.path == path]
-        np.testing.assert_array_equal(table.position_m[own], first[: own.sum()])
+    distance_m = np.linalg.norm(table.position_m[:, None] - full.position_m, axis=2)
+    place = distance_m.argmin(axis=1)
+    np.testing.assert_array_equal(full.world_from_cam[place], table.world_from_cam)
+    np.testing.assert_array_equal(full.path[place], table.path)
+    assert len(np.unique(np.diff(place))) == 1  # one stride throughout
     train = planned(spread, n_frames, "train")
     np.testing.assert_array_equal(train.position_m, full.position_m[:n_frames])
+
+
+def _distance_and_yaw(table):
+    """Distance from the middle of the room's box, as its share, and yaw of the camera (N,)."""
+    middle, half = ROOM.mean(axis=0), np.ptp(ROOM, axis=0) / 2
+    distance = (np.abs(table.position_m - middle) / half).max(axis=1)
+    forward = table.world_from_cam[:, :3, 2]
+    return distance, np.arctan2(forward[:, 1], forward[:, 0])
+
+
+def test_test_frames_have_the_positions_and_headings_of_training_frames():
+    """Two-sample tests over the frames of many paths.
+
+    The first frames of paths fail it: where a path begins is a waypoint, drawn anywhere in the box,
+    and a way between two waypoints is nearer to its middle.
+    """
+    spread = CollectionConfig(frame_spacing_m=0.05, min_path_m=1.5, test_paths=400)
+    train, test = (
+        plan_split(EMPTY, ROOM, SCENE, spread, n_frames, np.random.default_rng(seed), split)
+        for seed, split, n_frames in ((0, "train", 40_000), (1, "test", 4000))
+    )
+    assert len(np.unique(test.path)) >= 400
+    first = np.concatenate([np.flatnonzero(train.path == path)[:10] for path in range(400)])
+    drawn = np.random.default_rng(2)
+
+    def chances(a, b):
+        # A frame of every fourth path: those of one path, or of two in a row, share waypoints.
+        few = [t.at(np.sort(drawn.choice(len(t), 100, replace=False))) for t in (a, b)]
+        shares = zip(*map(_distance_and_yaw, few), strict=True)
+        return [ks_2samp(*pair).pvalue for pair in shares]
+
+    assert min(chances(test, train)) > 0.05
+    assert chances(train.at(first), train)[0] < 1e-4
 
 
 def round_by_round(caster, k, n_frames, rng):
