@@ -12,7 +12,7 @@ configfile: "config/config.yaml"
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/collection.smk"
-include: "workflow/rules/groundtruth.smk"
+include: "workflow/rules/estimation.smk"
 include: "workflow/rules/training.smk"
 include: "workflow/rules/references.smk"
 include: "workflow/rules/evidence.smk"
@@ -113,7 +113,7 @@ rule datasets:
         (
             under("datasets/{scene}/network/manifest.json", scene=CONFIG.datasets)
             if CONFIG.datasets is not None
-            else FILES.manifests("network") + FILES.manifests("groundtruth")
+            else FILES.manifests("network") + FILES.manifests("estimation")
         ),
 
 

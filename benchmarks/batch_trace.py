@@ -34,12 +34,12 @@ PIECE_M = 1.0
 def features_of(color: Files, config: Config) -> tuple[np.ndarray, np.ndarray]:
     """Return how many usual features each image has, and how many it is given in the end."""
     counts = []
-    for few in (0, config.groundtruth.sfm.few_features):
+    for few in (0, config.estimation.sfm.few_features):
         with TemporaryDirectory() as temporary:
             images, database = Path(temporary, "images"), Path(temporary, "database.db")
-            link_images(color, config.groundtruth_camera, images)
-            sfm = config.groundtruth.sfm.model_copy(update={"few_features": few})
-            extract_features(images, database, config.groundtruth_camera, sfm)
+            link_images(color, config.estimation_camera, images)
+            sfm = config.estimation.sfm.model_copy(update={"few_features": few})
+            extract_features(images, database, config.estimation_camera, sfm)
             with pycolmap.Database.open(database) as opened:
                 found = sorted(opened.read_all_images(), key=lambda image: image.name)
                 ids = [image.image_id for image in found]

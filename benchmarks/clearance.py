@@ -46,8 +46,8 @@ def count_features(mesh: Path, plan: PoseTable, config: Config, every: int) -> n
     Returns:
         Number of features of each view (N,).
     """
-    camera = config.groundtruth_camera
-    sfm = config.groundtruth.sfm.model_copy(update={"few_features": 0})
+    camera = config.estimation_camera
+    sfm = config.estimation.sfm.model_copy(update={"few_features": 0})
     with TemporaryDirectory() as temporary:
         images, database = Path(temporary, "images"), Path(temporary, "database.db")
         images.mkdir()

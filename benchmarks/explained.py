@@ -6,7 +6,7 @@
 reads the models of finished runs, as they were made: nothing is estimated anew. A row for each
 batch of the training set has the share, and the errors of the batch placed as if the batch before
 it had ended at its true pose. The mapper starts again where the share is below
-``groundtruth.sfm.min_explained``; the table shows which batches another limit would concern.
+``estimation.sfm.min_explained``; the table shows which batches another limit would concern.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ def batch_rows(results: Path, profile: str) -> Iterator[dict[str, Any]]:
     """
     config = load_config(Path("config/config.yaml"), Path(f"config/{profile}.yaml"))
     root = results / profile
-    for folder in sorted((root / "groundtruth").glob(f"*/{SIZE}/sfm/{SPLIT}")):
+    for folder in sorted((root / "estimates").glob(f"*/{SIZE}/sfm/{SPLIT}")):
         scene = folder.parents[2].name
         poses = read_pose_table(root / "labels" / scene / SIZE / "synfeal" / f"{SPLIT}.csv")
         count = config.n_frames(scene, SIZE, SPLIT)
-        for batch in batches_of(count, config.groundtruth.batch_frames):
+        for batch in batches_of(count, config.estimation.batch_frames):
             trajectory, facts, cpu_s = made(root, "sfm", scene, batch.index)
             truth = poses.world_from_cam[batch.start : batch.stop]
             errors = measured(trajectory, truth, config)

@@ -43,13 +43,13 @@ def frames_of(root: Path, config: Config, scene: str, index: int) -> tuple[Files
     """Return colour images, depth images and true poses (N, 4, 4) of a batch.
 
     Args:
-        root: Results of the profile, with ``datasets/<scene>/groundtruth/seq-XX``.
+        root: Results of the profile, with ``datasets/<scene>/estimation/seq-XX``.
         config: The profile.
         scene: Name of the scene.
         index: Number of the batch in the training set.
     """
-    batch = batches_of(config.n_frames(scene, SIZE, SPLIT), config.groundtruth.batch_frames)[index]
-    folder = root / "datasets" / scene / "groundtruth"
+    batch = batches_of(config.n_frames(scene, SIZE, SPLIT), config.estimation.batch_frames)[index]
+    folder = root / "datasets" / scene / "estimation"
     places = [divmod(frame, config.shard_frames) for frame in range(batch.start, batch.stop)]
     stems = [
         folder / f"seq-{sequence + 1:02d}" / f"frame-{frame:06d}" for sequence, frame in places
@@ -74,7 +74,7 @@ def estimate(
         The trajectory, facts about it, and the processor seconds it took.
     """
     color, depth, truth = files
-    cfg, camera = config.groundtruth, config.groundtruth_camera
+    cfg, camera = config.estimation, config.estimation_camera
     began = time.process_time()
     if method == "sfm":
         seed = seed_of(config.seed, "sfm", scene, SIZE, SPLIT, f"{index:03d}")
@@ -90,7 +90,7 @@ def made(
     root: Path, method: str, scene: str, index: int
 ) -> tuple[BatchTrajectory, dict[str, Any], float]:
     """Read the estimate of a batch that a run has made, with facts and processor seconds."""
-    stem = root / "groundtruth" / scene / SIZE / method / SPLIT / f"batch-{index:03d}"
+    stem = root / "estimates" / scene / SIZE / method / SPLIT / f"batch-{index:03d}"
     facts = json.loads(stem.with_suffix(".json").read_text())
     took_s = sum(value for name, value in facts.items() if name.endswith("_s"))
     return read_trajectory(stem.with_suffix(".csv")), facts, took_s
@@ -100,9 +100,9 @@ def with_settings(config: Config, given: Sequence[str]) -> Config:
     """Replace settings of SfM by those given as ``name=value``."""
     parts = (setting.partition("=") for setting in given)
     settings = {name: yaml.safe_load(value) for name, _, value in parts}
-    sfm = SfmConfig.model_validate({**config.groundtruth.sfm.model_dump(), **settings})
-    groundtruth = config.groundtruth.model_copy(update={"sfm": sfm})
-    return config.model_copy(update={"groundtruth": groundtruth})
+    sfm = SfmConfig.model_validate({**config.estimation.sfm.model_dump(), **settings})
+    estimation = config.estimation.model_copy(update={"sfm": sfm})
+    return config.model_copy(update={"estimation": estimation})
 
 
 def errors_of(trajectory: BatchTrajectory, truth: Any) -> tuple[Any, Any]:
@@ -126,7 +126,7 @@ def measured(trajectory: BatchTrajectory, truth: Any, config: Config) -> dict[st
     Returns:
         Numbers of a row, by column.
     """
-    cfg = config.groundtruth
+    cfg = config.estimation
     error_m, error_rad = errors_of(trajectory, truth)
     error_deg = np.degrees(error_rad)
     found = trajectory.registered

@@ -21,7 +21,7 @@ from baselines.training.device import open_device, precision_on
 from baselines.training.fit import PROTOCOLS, Fitting
 from baselines.training.optimizer import Schedule, optimisation_of
 from baselines.training.rotation import RandomRotation
-from baselines.training.selection import Progress, Selection
+from baselines.training.selection import Selection, TrainingProgress
 from reproduction.config.load import load_config
 from synfeal.camera.projection import Intrinsics
 
@@ -64,7 +64,7 @@ def fitting_of(model: ModelName, profile: Path) -> Fitting:
             PROTOCOLS[config.training.protocol].optimiser, localizer, schedule
         ),
         order=BatchOrder(FRAMES, batch_size, seed=0),
-        progress=Progress(schedule.steps, batch_size, device),
+        progress=TrainingProgress(schedule.steps, batch_size, device),
         selection=Selection("last", localizer, statistics, None, precision),
         evaluations=frozenset(),
         precision=precision,

@@ -82,7 +82,7 @@ class Sweep(Strict):
         return self
 
 
-class Run(NamedTuple):
+class SweepRun(NamedTuple):
     """One row of the table that is to be measured."""
 
     key: dict[str, str]  # value of every axis, and the seed, as the table writes them
@@ -105,7 +105,7 @@ def read_sweep(path: Path) -> Sweep:
     return sweep
 
 
-def runs_of(sweep: Sweep, results: Path, n_seeds: int) -> list[Run]:
+def runs_of(sweep: Sweep, results: Path, n_seeds: int) -> list[SweepRun]:
     """List all runs of a sweep, one seed after the other.
 
     Args:
@@ -139,7 +139,7 @@ def _combinations(sweep: Sweep) -> Iterator[tuple[dict[str, str], Changes]]:
 
 def _run(
     key: dict[str, str], changes: Changes, sweep: Sweep, profile: Mapping[str, Any], results: Path
-) -> Run:
+) -> SweepRun:
     model = open_measure(sweep.measure).case
     raw = {name: profile[name] for name in model.model_fields if name in profile}
     for name, value in {**sweep.given, **changes}.items():
@@ -150,7 +150,7 @@ def _run(
     except ValidationError as error:
         where = ", ".join(f"{name} {value}" for name, value in key.items())
         raise InputError(f"{sweep.title} ({where}): {describe(error)}") from error
-    return Run(key, case, hashlib.sha256(settings.encode()).hexdigest()[:12])
+    return SweepRun(key, case, hashlib.sha256(settings.encode()).hexdigest()[:12])
 
 
 def _nested(name: str, value: Value) -> dict[str, Any]:
@@ -181,7 +181,7 @@ def read_table(path: Path, keys: Sequence[str]) -> pd.DataFrame:
     return table
 
 
-def run_missing(measure: str, runs: Sequence[Run], table: Path, jobs: int) -> pd.DataFrame:
+def run_missing(measure: str, runs: Sequence[SweepRun], table: Path, jobs: int) -> pd.DataFrame:
     """Measure the runs that the table lacks, and return the rows of all.
 
     Rows are added to the table one by one, so stopping loses only the runs under way.
@@ -212,7 +212,7 @@ def run_missing(measure: str, runs: Sequence[Run], table: Path, jobs: int) -> pd
 
 
 def _measure(
-    measure: str, runs: Sequence[Run], table: Path, keys: Sequence[str], jobs: int
+    measure: str, runs: Sequence[SweepRun], table: Path, keys: Sequence[str], jobs: int
 ) -> None:
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(jobs, mp_context=context, max_tasks_per_child=1) as pool:

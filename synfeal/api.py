@@ -48,7 +48,7 @@ from synfeal.planning.repeat import read_poses
 from synfeal.records.provenance import generator_of
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Rgb
-from synfeal.render.surface import Normals, Surface, SurfaceTable
+from synfeal.render.surface import Normals, SurfaceImage, SurfaceTable
 from synfeal.validation.camera import camera_of_dataset
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ class Renderer:
         """
         return self._opened.render_rgbd(_rigid(world_from_cam))
 
-    def render_surface(self, world_from_cam: NDArray[np.float64]) -> Surface:
+    def render_surface(self, world_from_cam: NDArray[np.float64]) -> SurfaceImage:
         """Render normals and masks from a camera pose (4, 4).
 
         Returns:

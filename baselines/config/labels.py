@@ -99,7 +99,7 @@ class PoseGraphConfig(Strict):
 NoiseDose = Literal["text", "code"]
 
 
-class GroundTruthConfig(Strict):
+class EstimationConfig(Strict):
     """Label replacement as in section 4.1, and the dose of errors put into labels."""
 
     noise_dose: NoiseDose = Field(

@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.config.labels import GroundTruthConfig
+from baselines.config.labels import EstimationConfig
 from baselines.labels.batches import Batch, BatchTrajectory, batches_of, read_trajectory
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.errors import InputError
@@ -99,7 +99,7 @@ def chain_batches(
     batches: Sequence[Batch],
     trajectories: Sequence[BatchTrajectory],
     truth: PoseTable,
-    cfg: GroundTruthConfig,
+    cfg: EstimationConfig,
     anchored: bool = False,
 ) -> tuple[PoseTable, list[BatchRecord]]:
     """Compute the labels of a whole split from its batches, and what assistance they needed.
@@ -194,7 +194,7 @@ def _place(
     world_from_first: Array,
     world_from_batch: Array,
     true_world_from_last: Array,
-    cfg: GroundTruthConfig,
+    cfg: EstimationConfig,
 ) -> tuple[Array, BatchRecord]:
     """Place one batch in the world and assist it where needed.
 
@@ -264,9 +264,9 @@ def write_label_set(
     test_batches: Sequence[Path],
     train_truth: Path,
     test_truth: Path,
-    groundtruth: GroundTruthConfig,
+    estimation: EstimationConfig,
     truth_used: TruthUsed,
-    estimation: dict[str, Any],
+    parameters: dict[str, Any],
     out_train: Path,
     out_test: Path,
     out_train_unassisted: Path,
@@ -282,15 +282,15 @@ def write_label_set(
         test_batches: Trajectories of the test batches, in order.
         train_truth: Pose table with the true training poses.
         test_truth: Pose table with the true test poses.
-        groundtruth: Frames per batch, and the thresholds of assistance.
+        estimation: Frames per batch, and the thresholds of assistance.
         truth_used: True poses the method itself used; batches placed by ``POSES`` are anchored.
-        estimation: Settings the labels depend on, written to ``out_record`` as they are.
+        parameters: Settings the labels depend on, written to ``out_record`` as they are.
         out_train: Pose table of the training labels.
         out_test: Pose table of the test labels.
         out_train_unassisted: The training labels as they would be without assistance.
         out_test_unassisted: The test labels as they would be without assistance.
         out_assistance: JSON with a record per batch; see :func:`write_assistance`.
-        out_record: JSON with ``estimation`` under ``parameters``.
+        out_record: JSON with ``parameters`` under their name.
 
     Raises:
         InputError: a file cannot be read, or a trajectory does not fit its batch.
@@ -302,7 +302,7 @@ def write_label_set(
             truth=train_truth,
             labels=out_train,
             unassisted=out_train_unassisted,
-            cfg=groundtruth,
+            cfg=estimation,
             anchored=anchored,
         ),
         "test": chain_split(
@@ -310,12 +310,12 @@ def write_label_set(
             truth=test_truth,
             labels=out_test,
             unassisted=out_test_unassisted,
-            cfg=groundtruth,
+            cfg=estimation,
             anchored=anchored,
         ),
     }
     write_assistance(out_assistance, reconstructed, records, truth_used)
-    write_json(out_record, {"parameters": estimation})
+    write_json(out_record, {"parameters": parameters})
 
 
 def chain_split(
@@ -323,7 +323,7 @@ def chain_split(
     truth: Path,
     labels: Path,
     unassisted: Path,
-    cfg: GroundTruthConfig,
+    cfg: EstimationConfig,
     anchored: bool = False,
 ) -> list[BatchRecord]:
     """Chain the batches of one split, and return a record per batch.

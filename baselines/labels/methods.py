@@ -12,7 +12,7 @@ from pkgutil import resolve_name
 
 import numpy as np
 
-from baselines.config.labels import GroundTruthConfig, PoseGraphConfig
+from baselines.config.labels import EstimationConfig, PoseGraphConfig
 from baselines.labels.batches import BatchTrajectory, write_trajectory
 from baselines.labels.chain import TruthUsed
 from baselines.labels.posegraph.graph import Edge, PoseGraph, check_connected, read_g2o
@@ -40,15 +40,15 @@ def graph_methods() -> list[str]:
 
 
 def stages_of(name: str) -> tuple[str, ...]:
-    """List the folders below ``groundtruth/<scene>/<size>`` of the stages of a method."""
+    """List the folders below ``estimates/<scene>/<size>`` of the stages of a method."""
     return ("rgbd", name) if METHODS[name].works_on == "graph" else (name,)
 
 
-def truth_used(groundtruth: GroundTruthConfig, name: str) -> TruthUsed:
+def truth_used(estimation: EstimationConfig, name: str) -> TruthUsed:
     """Return which true poses place and scale the batches of a method."""
     if name != "sfm":
         return TruthUsed.NOTHING
-    by_camera = groundtruth.sfm.gauge == "first_camera"
+    by_camera = estimation.sfm.gauge == "first_camera"
     return TruthUsed.CAMERA if by_camera else TruthUsed.POSES
 
 
@@ -58,7 +58,7 @@ def write_estimate(
     start: int,
     stop: int,
     camera: CameraConfig,
-    groundtruth: GroundTruthConfig,
+    estimation: EstimationConfig,
     seed: int,
     out_trajectory: Path,
     out_facts: Path,
@@ -71,7 +71,7 @@ def write_estimate(
         start: First frame of the batch, counted from 0 in the split.
         stop: One past its last frame.
         camera: Camera of colour and depth.
-        groundtruth: Settings of all methods.
+        estimation: Settings of all methods.
         seed: Seed of whatever is random.
         out_trajectory: CSV to write.
         out_facts: JSON to write: what the estimation took.
@@ -82,7 +82,7 @@ def write_estimate(
     color, depth = (
         frames_between(sequences, f"{kind}.png", start, stop) for kind in ("color", "depth")
     )
-    trajectory, facts = estimate_batch(frame_method, color, depth, camera, groundtruth, seed)
+    trajectory, facts = estimate_batch(frame_method, color, depth, camera, estimation, seed)
     write_json(out_facts, facts)
     write_trajectory(out_trajectory, trajectory)
 
@@ -92,7 +92,7 @@ def estimate_batch(
     color_paths: Sequence[FrameFile],
     depth_paths: Sequence[FrameFile],
     camera: CameraConfig,
-    groundtruth: GroundTruthConfig,
+    estimation: EstimationConfig,
     seed: int,
 ) -> tuple[BatchTrajectory, Facts]:
     """Estimate one batch by a method that works on frames.
@@ -102,7 +102,7 @@ def estimate_batch(
         color_paths: Colour images in order.
         depth_paths: 16-bit depth images in millimetres, 65535 where nothing was hit.
         camera: Camera of colour and depth.
-        groundtruth: Settings of all methods; the function is given those that
+        estimation: Settings of all methods; the function is given those that
             ``LabelMethod.settings`` names.
         seed: Seed of whatever is random.
 
@@ -111,7 +111,7 @@ def estimate_batch(
     """
     method = METHODS[name]
     function = resolve_name(method.place)
-    settings = getattr(groundtruth, method.settings) if method.settings else None
+    settings = getattr(estimation, method.settings) if method.settings else None
     facts: Facts = {}
     with timed(facts, "estimation_s"):
         trajectory = function(color_paths, depth_paths, camera, settings, seed)

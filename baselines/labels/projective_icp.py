@@ -37,14 +37,14 @@ _SINGULAR = 1e-9
 _SMOOTHING = (5, 0.03, 2.0)
 
 
-class Surface(NamedTuple):
+class PointNormalMap(NamedTuple):
     """Points and normals (h, w, 3) in the camera's frame, nan where there are none."""
 
     points: Array
     normals: Array
 
 
-def pyramid_of(depth_m: Depth, camera: CameraConfig) -> list[Surface]:
+def pyramid_of(depth_m: Depth, camera: CameraConfig) -> list[PointNormalMap]:
     """Compute points and normals of a depth image at each of ``LEVELS``, coarse to fine.
 
     Args:
@@ -57,15 +57,15 @@ def pyramid_of(depth_m: Depth, camera: CameraConfig) -> list[Surface]:
     return [_surface(measured[::s, ::s], smooth_m[::s, ::s], camera, s) for s, _ in LEVELS]
 
 
-def _surface(depth_m: Depth, smooth_m: Depth, camera: CameraConfig, stride: int) -> Surface:
+def _surface(depth_m: Depth, smooth_m: Depth, camera: CameraConfig, stride: int) -> PointNormalMap:
     """Build one level; its normals are those of the smoothed depth."""
     normals = np.full((*depth_m.shape, 3), np.nan)
     normals[1:-1, 1:-1] = normals_of(points_of(smooth_m, camera, stride))
-    return Surface(points_of(depth_m, camera, stride), normals)
+    return PointNormalMap(points_of(depth_m, camera, stride), normals)
 
 
 def register(
-    shown: list[Surface], seen: list[Surface], camera: CameraConfig
+    shown: list[PointNormalMap], seen: list[PointNormalMap], camera: CameraConfig
 ) -> tuple[Array, float]:
     """Register a frame to the surface expected in its place, starting without motion.
 

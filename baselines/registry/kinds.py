@@ -75,7 +75,7 @@ class LabelMethod(Kind):
             ``frames``: ``(color_paths, depth_paths, camera, settings, seed)``;
             ``graph``: ``(graph, cfg)``, the pose graph of RGB-D odometry and ``PoseGraphConfig``;
             ``rule``: a rule of its own, named like the method.
-        settings: Key below ``groundtruth`` whose settings a method on frames is given.
+        settings: Key below ``estimation`` whose settings a method on frames is given.
         unused: Times among the facts of its stages that it would not have spent.
         published_assisted: Batches in which section 4.1 says that it needed assistance.
     """

@@ -15,7 +15,7 @@ from baselines.training.data import BatchOrder, ImageStatistics, LabelledFrames
 from baselines.training.device import Precision, autocast
 from baselines.training.optimizer import Optimisation, OptimiserName, Schedule, optimisation_of
 from baselines.training.resume import RandomState, Restorable, ResumeFile, stop_signals
-from baselines.training.selection import HistoryRow, Progress, Selection, SelectionKind
+from baselines.training.selection import HistoryRow, Selection, SelectionKind, TrainingProgress
 
 
 class Protocol(NamedTuple):
@@ -96,7 +96,7 @@ class Fitting:
     statistics: ImageStatistics
     optimisation: Optimisation
     order: BatchOrder
-    progress: Progress
+    progress: TrainingProgress
     selection: Selection
     evaluations: frozenset[int]
     precision: Precision
@@ -184,7 +184,7 @@ def fit(
         statistics,
         optimisation_of(protocol.optimiser, localizer, schedule),
         BatchOrder(len(frames), schedule.batch_size, seed, protocol.order == "shuffled"),
-        Progress(schedule.steps, schedule.batch_size, frames.images.device),
+        TrainingProgress(schedule.steps, schedule.batch_size, frames.images.device),
         selection,
         selection.due_after(schedule.steps, schedule.samples_seen),
         precision,

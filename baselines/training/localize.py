@@ -26,7 +26,7 @@ from baselines.training.virtual_views import VirtualViews
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.photograph import PhotographCamera, Source
 from synfeal.dataset.frame_files import IMAGE_DAMAGE, opened_image
-from synfeal.dataset.packed import View, fit_frame
+from synfeal.dataset.packed import NetworkView, fit_frame
 from synfeal.dataset.pose_table import COLUMNS, SEEN
 from synfeal.dataset.render_sequence import Progress
 from synfeal.errors import InputError, why
@@ -99,7 +99,7 @@ def localize(
     """Write the pose of each picture as CSV (columns of ``HEADER``), in the order named.
 
     ``status`` is ``inside`` of what the model has seen, ``outside``, ``unknown`` where the model
-    cannot tell, or ``no pose``; ``typicality`` and ``outside_m`` are those of :class:`Seen`.
+    cannot tell, or ``no pose``; ``typicality`` and ``outside_m`` are those of :class:`Familiarity`.
 
     Args:
         model: Checkpoint.
@@ -152,7 +152,7 @@ def localize(
     )
 
 
-class Seen(NamedTuple):
+class Familiarity(NamedTuple):
     """Distance of answers from what a localizer has seen.
 
     Attributes:
@@ -179,7 +179,7 @@ class Seen(NamedTuple):
         return words.astype(object)
 
 
-def _seen(trained: TrainedLocalizer, position_m: Array, features: Tensor | None) -> Seen:
+def _seen(trained: TrainedLocalizer, position_m: Array, features: Tensor | None) -> Familiarity:
     """Compare pictures and answers with what was learned from.
 
     Args:
@@ -192,12 +192,12 @@ def _seen(trained: TrainedLocalizer, position_m: Array, features: Tensor | None)
     if calibration is not None and features is not None:
         typical = typicality(calibration, features).round(DECIMALS)
     if trained.description.bounds_m is None:
-        return Seen(typical, unknown, np.zeros(len(position_m), bool))
+        return Familiarity(typical, unknown, np.zeros(len(position_m), bool))
     low, high = np.array(trained.description.bounds_m)
     excess_m = np.maximum(np.maximum(low - position_m, position_m - high), 0.0)
     beyond = excess_m > np.maximum(high - low, LEAST_MARGIN_M)
     outside_m = np.linalg.norm(excess_m, axis=1).round(DECIMALS)
-    return Seen(typical, outside_m, np.asarray(beyond.any(axis=1)))
+    return Familiarity(typical, outside_m, np.asarray(beyond.any(axis=1)))
 
 
 def _moved(sequence_from_world: Array, position_m: Array, quat_wxyz: Array) -> tuple[Array, Array]:
@@ -271,7 +271,7 @@ def _holds_poses(out: Path) -> bool:
 
 
 def _write(
-    out: Path, pictures: Sequence[Path], poses: Array, good: NDArray[np.bool_], seen: Seen
+    out: Path, pictures: Sequence[Path], poses: Array, good: NDArray[np.bool_], seen: Familiarity
 ) -> None:
     """Write numbers with enough digits to read back the same values; names as the bytes they are.
 
@@ -313,7 +313,7 @@ def find_pictures(named: Iterable[Path]) -> list[Path]:
     return found
 
 
-def read_picture(path: Path, input_px: int, view: View = "square") -> NDArray[np.uint8]:
+def read_picture(path: Path, input_px: int, view: NetworkView = "square") -> NDArray[np.uint8]:
     """Read a picture that shows what training frames do.
 
     Args:

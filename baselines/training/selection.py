@@ -159,7 +159,7 @@ class HistoryRow(NamedTuple):
     held_out_orientation_deg: float | None = None
 
 
-class Progress:
+class TrainingProgress:
     """Collects the history and says every few seconds how far the training run is."""
 
     def __init__(self, steps: int, batch_size: int, device: torch.device) -> None:

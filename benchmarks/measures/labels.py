@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from baselines.config.labels import GroundTruthConfig
+from baselines.config.labels import EstimationConfig
 from baselines.labels.chain import fill_gaps
 from baselines.labels.kinect_fusion import kinect_fusion_batch
 from baselines.labels.posegraph.levenberg_marquardt import optimise_lm
@@ -35,8 +35,8 @@ class BatchCase(Strict):
         1, description="frames of the sequence from one frame of the batch to the next"
     )
     length: int = Field(251, description="frames of the batch")
-    groundtruth_camera: CameraConfig = Field(description="camera of the frames")
-    groundtruth: GroundTruthConfig = Field(description="settings of the methods")
+    estimation_camera: CameraConfig = Field(description="camera of the frames")
+    estimation: EstimationConfig = Field(description="settings of the methods")
 
 
 class BatchFiles(NamedTuple):
@@ -56,9 +56,9 @@ def run_sfm(case: BatchCase, seed: int) -> dict[str, float]:
     batch = open_batch(case)
     trajectory, facts = sfm_batch(
         batch.color,
-        case.groundtruth_camera,
+        case.estimation_camera,
         batch.world_from_cam,
-        case.groundtruth.sfm,
+        case.estimation.sfm,
         seed_of(seed, "sfm"),
     )
     return {
@@ -74,9 +74,9 @@ def run_rgbd(case: BatchCase, seed: int) -> dict[str, float]:
     Raises:
         InputError: the frames cannot be used.
     """
-    batch, cfg = open_batch(case), case.groundtruth
+    batch, cfg = open_batch(case), case.estimation
     graph, facts = rgbd_graph(
-        batch.color, batch.depth, case.groundtruth_camera, cfg.rgbd, seed_of(seed, "rgbd")
+        batch.color, batch.depth, case.estimation_camera, cfg.rgbd, seed_of(seed, "rgbd")
     )
     begin_s = time.process_time()
     optimised = optimise_lm(graph, cfg.posegraph.lm_iterations)
@@ -96,7 +96,7 @@ def run_kinect_fusion(case: BatchCase, seed: int) -> dict[str, float]:
     Raises:
         InputError: the frames cannot be used.
     """
-    batch, cfg, camera = open_batch(case), case.groundtruth.kinect_fusion, case.groundtruth_camera
+    batch, cfg, camera = open_batch(case), case.estimation.kinect_fusion, case.estimation_camera
     # Two frames compile the registration, which is not what is timed.
     kinect_fusion_batch(batch.color[:2], batch.depth[:2], camera, cfg)
     begin_s = time.process_time()

@@ -123,7 +123,7 @@ def kinectfusion_fails(claim: Claim, evidence: Evidence) -> Outcome:
     """Judge C15: frame-to-model tracking needs assistance in more than half of its batches.
 
     Frames farther apart than ``FARTHEST_M`` defeat any such tracker, whatever the scene: it starts
-    at the pose before and reaches a few centimetres (docs/groundtruth.md).
+    at the pose before and reaches a few centimetres (docs/estimation.md).
     """
     by_scene = _assisted(evidence, KINECT_FUSION)
     poses = evidence.test_set("large_room", "6k").poses

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from baselines.config.labels import GroundTruthConfig
+from baselines.config.labels import EstimationConfig
 from baselines.config.learning import (
     MODELS,
     SHIPPED_WIDTH,
@@ -30,6 +31,8 @@ from synfeal.config.effects import RobustnessConfig
 # localizers of the published `night` were shown 30,000 images and scene coordinates 2,000, their
 # jobs took the same processor time (results/published/night/benchmarks.csv).
 IMAGES_PER_COORDINATE_IMAGE = 15
+# Keys of earlier versions, and what they are called now.
+RENAMED_KEYS = {"groundtruth": "estimation", "groundtruth_camera": "estimation_camera"}
 
 
 class RenderSpeedConfig(Strict):
@@ -40,7 +43,7 @@ class RenderSpeedConfig(Strict):
         2,
         ge=1,
         le=2,
-        description="how many of network_camera and, with estimated labels, groundtruth_camera,"
+        description="how many of network_camera and, with estimated labels, estimation_camera,"
         " smallest first",
     )
 
@@ -58,15 +61,24 @@ class Config(DatasetConfig):
     datasets: tuple[Slug, ...] | None = Field(
         None, description="scenes of the target `datasets`; null: those of the design"
     )
-    groundtruth_camera: CameraConfig = part(CameraConfig, "of frames labels are estimated from")
+    estimation_camera: CameraConfig = part(CameraConfig, "of frames labels are estimated from")
     render_speed: RenderSpeedConfig = part(RenderSpeedConfig, "what rendering is measured on")
-    groundtruth: GroundTruthConfig = part(GroundTruthConfig, "labels (docs/groundtruth.md)")
+    estimation: EstimationConfig = part(EstimationConfig, "labels (docs/estimation.md)")
     references: ReferencesConfig = part(ReferencesConfig, "other methods (docs/references.md)")
     robustness: RobustnessConfig = part(RobustnessConfig, "tests with effects (docs/variation.md)")
     network: NetworkConfig = part(NetworkConfig, "shape of all localizers")
     training: RepeatedTraining = Field(description="docs/localizers.md")
     pretraining: PretrainingConfig = part(PretrainingConfig, "what runs start from (docs/start.md)")
     localizers: Localizers = Field(description="hyper-parameters of each")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_present_keys(cls, given: Any) -> Any:
+        """Refuse keys of earlier versions, naming those that took their place."""
+        for old, new in RENAMED_KEYS.items():
+            if isinstance(given, Mapping) and old in given:
+                raise ValueError(f"{old}: is called {new} now; rename the key")
+        return given
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -84,10 +96,10 @@ class Config(DatasetConfig):
             raise ValueError(f"datasets: '{unknown[0]}' is not one of {sorted(self.scenes)}")
         if self.pretraining.source == "rooms" and not self.rooms:
             raise ValueError("pretraining.source: rooms needs scenes with `builder: random_room`")
-        estimated = self.groundtruth_camera
+        estimated = self.estimation_camera
         if estimated.projection is not None or estimated.stereo_baseline_m is not None:
             raise ValueError(
-                "groundtruth_camera: labels are estimated from single perspective images; leave out"
+                "estimation_camera: labels are estimated from single perspective images; leave out"
                 " projection and stereo_baseline_m"
             )
         camera = self.network_camera

@@ -26,8 +26,8 @@ DEFAULT_PROFILE = "mini"
 COMPARED = (
     "scale",
     "collection.frame_spacing_m",
-    "groundtruth_camera.width",
-    "groundtruth.batch_frames",
+    "estimation_camera.width",
+    "estimation.batch_frames",
     "network.input_px",
     "network.width",
     "training.samples_seen.6k",

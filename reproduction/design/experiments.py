@@ -46,11 +46,11 @@ class Experiment(Strict):
     labels: str = Field(
         "synfeal",
         description="`synfeal`: true poses; `noise`, `offset`, `bend`, `scale`, `drift`: with an"
-        " error (docs/tables.md); or a label method (docs/groundtruth.md)",
+        " error (docs/tables.md); or a label method (docs/estimation.md)",
     )
     noise_m: NonNegative = Field(
         0.0,
-        description="median position error put into labels, metres, as `groundtruth.noise_dose`"
+        description="median position error put into labels, metres, as `estimation.noise_dose`"
         " reads it",
     )
     noise_deg: NonNegative = Field(
@@ -221,9 +221,9 @@ def _problem(row: Experiment, config: Config) -> str:
         return f"size '{row.size}' has no test frames to score on"
     if row.size not in config.training.samples_seen:
         return f"size '{row.size}' has no training.samples_seen entry"
-    if any(config.groundtruth_camera.distortion) and row.estimated and row.labels != "sfm":
+    if any(config.estimation_camera.distortion) and row.estimated and row.labels != "sfm":
         return (
-            f"labels '{row.labels}' need pinhole images; leave groundtruth_camera.distortion at"
+            f"labels '{row.labels}' need pinhole images; leave estimation_camera.distortion at"
             " zero (a calibration sets it) or drop the row"
         )
     return ""
@@ -238,8 +238,8 @@ class Design(Strict):
 
     rows: tuple[Experiment, ...] = Field(description="in the order of the file")
     repetitions: Repetitions = Field(description="`training.repetitions`")
-    more_scenes: tuple[str, ...] = Field((), description="`groundtruth.more_scenes`")
-    noise_dose: NoiseDose = Field("text", description="`groundtruth.noise_dose`")
+    more_scenes: tuple[str, ...] = Field((), description="`estimation.more_scenes`")
+    noise_dose: NoiseDose = Field("text", description="`estimation.noise_dose`")
 
     @property
     def estimated(self) -> list[tuple[str, str, str]]:
@@ -316,14 +316,14 @@ def read_design(config: Config) -> Design:
     whole = Design(
         rows=every_row,
         repetitions=config.training.repetitions,
-        more_scenes=config.groundtruth.more_scenes,
-        noise_dose=config.groundtruth.noise_dose,
+        more_scenes=config.estimation.more_scenes,
+        noise_dose=config.estimation.noise_dose,
     )
     missing = _without_frames(whole)
     if missing:
         scene, size = missing[0]
         raise InputError(
-            f"groundtruth.more_scenes: '{scene}': {design_name(config)} has no row of size"
+            f"estimation.more_scenes: '{scene}': {design_name(config)} has no row of size"
             f" '{size}' in that scene"
         )
     # `tables` may leave out every row of a further scene: then its labels are left out, too.

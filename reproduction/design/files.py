@@ -37,7 +37,7 @@ class Files:
     """Names of the files of a profile, below its results.
 
     In all methods ``scene`` and ``size`` are keys of the profile, ``split`` is ``train`` or
-    ``test``, ``camera`` is ``network`` or ``groundtruth``, and ``method`` is a label method.
+    ``test``, ``camera`` is ``network`` or ``estimation``, and ``method`` is a label method.
 
     Args:
         config: The profile.
@@ -118,7 +118,7 @@ class Files:
 
         Args:
             scene: Name of the scene.
-            camera: ``network`` for frames that localizers see, ``groundtruth`` for large ones with
+            camera: ``network`` for frames that localizers see, ``estimation`` for large ones with
                 depth.
             split: ``train`` or ``test``.
 
@@ -161,7 +161,7 @@ class Files:
 
         Args:
             scene: Name of the scene.
-            camera: ``network`` or ``groundtruth``.
+            camera: ``network`` or ``estimation``.
             split: ``train`` or ``test``; None for both.
             stop: List only sequences with frames below this one in their split; None for all.
         """
@@ -177,7 +177,7 @@ class Files:
 
         Args:
             scene: Name of the scene.
-            camera: ``network`` or ``groundtruth``.
+            camera: ``network`` or ``estimation``.
             kind: ``csv`` for the poses, ``coverage.json`` for what they cover: only of ``network``,
                 which alone renders whole plans.
         """
@@ -220,7 +220,7 @@ class Files:
 
         Args:
             scene: Name of the scene.
-            camera: ``network`` or ``groundtruth``.
+            camera: ``network`` or ``estimation``.
             kind: ``glb`` for the mesh, ``json`` for the record of how it was chosen.
             render: Settings of rendering; None for the profile's own.
 
@@ -233,7 +233,7 @@ class Files:
 
     def cameras(self, scene: str) -> list[str]:
         """List cameras that frames of a scene are rendered through."""
-        return ["network", *(["groundtruth"] if scene in self.depth_scenes else [])]
+        return ["network", *(["estimation"] if scene in self.depth_scenes else [])]
 
     def details(self, scene: str, kind: str) -> list[str]:
         """List levels of detail of these cameras; none where the full mesh is drawn."""
@@ -245,7 +245,7 @@ class Files:
     def batches(self, scene: str, size: str, split: str) -> list[Batch]:
         """List batches that the labels of a split are estimated in."""
         count = self.config.n_frames(scene, size, split)
-        return batches_of(count, self.config.groundtruth.batch_frames)
+        return batches_of(count, self.config.estimation.batch_frames)
 
     def batch(self, scene: str, size: str, split: str, index: str) -> Batch:
         """Return a batch by its number in file names, such as ``003``."""
@@ -254,18 +254,18 @@ class Files:
     def frames_of_batch(self, scene: str, size: str, split: str, index: str) -> list[str]:
         """List sequences of image files up to the one that a batch ends in."""
         stop = self.batch(scene, size, split, index).stop
-        return self.sequence_dirs(scene, "groundtruth", split, stop)
+        return self.sequence_dirs(scene, "estimation", split, stop)
 
     def batch_files(self, scene: str, size: str, method: str, split: str) -> list[str]:
         """List trajectories of all batches of a split by one method."""
-        folder = f"{self.root}/groundtruth/{scene}/{size}/{method}/{split}"
+        folder = f"{self.root}/estimates/{scene}/{size}/{method}/{split}"
         return [f"{folder}/batch-{b.index:03d}.csv" for b in self.batches(scene, size, split)]
 
     def batch_facts(self) -> list[str]:
         """List records of all batches of the estimated label sets, stage by stage."""
         return sorted(
             {
-                f"{self.root}/groundtruth/{scene}/{size}/{stage}/{split}/batch-{b.index:03d}.json"
+                f"{self.root}/estimates/{scene}/{size}/{stage}/{split}/batch-{b.index:03d}.json"
                 for scene, size, method in self.design.estimated
                 for stage in stages_of(method)
                 for split in SPLITS

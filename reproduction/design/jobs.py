@@ -93,7 +93,7 @@ def _scenes(files: Files) -> dict[str, list[Job]]:
 def _details(files: Files, rooms: Iterable[str]) -> list[Job]:
     """List the meshes that colours are drawn of, but for cameras that draw the full one."""
     drawn = [(scene, "network") for scene in [*files.scenes, *rooms]]
-    drawn += [(scene, "groundtruth") for scene in files.depth_scenes]
+    drawn += [(scene, "estimation") for scene in files.depth_scenes]
     drawn = [key for key in drawn if files.detail(*key, "glb")]
     robust = files.config.robustness.scene
     effects = [*files.tested_effects, MIXED] if files.has_robustness else []
@@ -106,7 +106,7 @@ def _frames(files: Files) -> dict[str, list[Job]]:
     rooms = files.config.rooms if files.backbones else []
     packed = [(scene, split) for scene in files.scenes for split in SPLITS]
     packed += [(room, "train") for room in rooms]
-    camera = "groundtruth"
+    camera = "estimation"
     return {
         "render": [
             {"scene": scene, "camera": camera, "sequence": sequence.name}

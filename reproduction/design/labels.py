@@ -31,7 +31,7 @@ def estimation_parameters(config: Config, name: str) -> dict[str, Any]:
     on_graph = method.works_on == "graph"
     settings = {"rgbd", "posegraph"} if on_graph else {method.settings or name}
     return {
-        "groundtruth": config.groundtruth.model_dump(mode="json", include=chained | settings),
-        "camera": config.groundtruth_camera.model_dump(mode="json"),
+        "estimation": config.estimation.model_dump(mode="json", include=chained | settings),
+        "camera": config.estimation_camera.model_dump(mode="json"),
         "seed": config.seed,
     }

@@ -63,13 +63,13 @@ def _size(files: Files, rule: str, job: Mapping[str, str]) -> tuple[float, str, 
         return float(config.coordinate_samples(job["size"])), "images", 1.0
     drawn_px, large_px = (
         camera.width * camera.height + FRAME_PX
-        for camera in (config.network_camera, config.groundtruth_camera)
+        for camera in (config.network_camera, config.estimation_camera)
     )
     px = {
         **dict.fromkeys(("render_packed", "render_varied"), drawn_px),
         **dict.fromkeys(("pack", "pack_varied"), config.network.input_px**2),
         **dict.fromkeys(("render", "rgbd", "estimate", "features", "views"), large_px),
-        "sfm": config.groundtruth.sfm.max_features,
+        "sfm": config.estimation.sfm.max_features,
     }
     return float(_frames(files, rule, job)), "frames", float(px.get(rule, 1))
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from reproduction.rooms.lighting import Lighting, baked, exposure_of, received
 from reproduction.rooms.scan import (
     Grid,
+    RoomSurface,
     Scanner,
-    Surface,
     albedo_of,
     jittered,
     scanned,
@@ -101,7 +101,7 @@ def _nearest_group(patch: Patch, lighting: Lighting) -> str:
 
 
 def _moved(
-    rng: np.random.Generator, surface: Surface, points_m: Points
+    rng: np.random.Generator, surface: RoomSurface, points_m: Points
 ) -> tuple[Points, list[NDArray[np.float64]]]:
     """Move vertices (V, 3) unevenly; also return their places on the picture of each patch."""
     pieces = zip(surface.grids, surface.per_patch(points_m), strict=True)
@@ -110,7 +110,7 @@ def _moved(
 
 
 def _reflecting(
-    surface: Surface, patches: Sequence[Patch]
+    surface: RoomSurface, patches: Sequence[Patch]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Compute linear albedo (V, 3) and glow (V,) at the vertices."""
     pairs = list(zip(patches, surface.grids, strict=True))
@@ -131,7 +131,7 @@ def _lit(patch: Patch, grid: Grid, tone: NDArray[np.float32]) -> NDArray[np.uint
 
 
 def _textured(
-    surface: Surface,
+    surface: RoomSurface,
     points_m: Points,
     shares: Sequence[NDArray[np.float64]],
     seen: NDArray[np.bool_],

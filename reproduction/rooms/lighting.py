@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from reproduction.rooms.scan import Surface
+from reproduction.rooms.scan import RoomSurface
 from synfeal.mesh.rays import RayCaster
 from synfeal.objects.canvas import Color
 
@@ -84,7 +84,7 @@ def _single(values: ArrayLike) -> NDArray[np.float32]:
 
 
 def baked(
-    surface: Surface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
+    surface: RoomSurface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
 ) -> Vectors:
     """Compute what display-referred albedo is multiplied by to show a surface in its light.
 
@@ -108,7 +108,7 @@ def exposure_of(light: Vectors) -> np.float32:
 
 
 def received(
-    surface: Surface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
+    surface: RoomSurface, albedo: Vectors, glow: NDArray[np.float32], lighting: Lighting
 ) -> Vectors:
     """Compute the light that arrives at a surface; the sum of what every source alone gives.
 

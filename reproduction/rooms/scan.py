@@ -120,7 +120,7 @@ def albedo_of(patch: Patch, grid: Grid) -> NDArray[np.float32]:
 
 
 @dataclass(frozen=True)
-class Surface:
+class RoomSurface:
     """The grids of many patches as one surface, vertices in the order of the patches."""
 
     grids: tuple[Grid, ...]  # the grid of every patch
@@ -138,7 +138,7 @@ class Surface:
         return [piece.reshape(*grid.shape, -1) for piece, grid in pieces]
 
 
-def surface_of(rng: np.random.Generator, patches: Sequence[Patch], cell_m: float) -> Surface:
+def surface_of(rng: np.random.Generator, patches: Sequence[Patch], cell_m: float) -> RoomSurface:
     """Refine all patches and join them to one surface.
 
     Args:
@@ -156,7 +156,7 @@ def surface_of(rng: np.random.Generator, patches: Sequence[Patch], cell_m: float
         for name in ("points_m", "normals", "inner_m")
     )
     n_faces = tuple(map(len, faces))
-    return Surface(
+    return RoomSurface(
         grids, points, normals, inner, np.concatenate(faces), np.concatenate(edges), n_faces
     )
 
@@ -202,7 +202,7 @@ def stations(
     return np.asarray(lower_m + share * np.subtract(upper_m, lower_m))
 
 
-def scanned(rng: np.random.Generator, surface: Surface, scanner: Scanner) -> Points:
+def scanned(rng: np.random.Generator, surface: RoomSurface, scanner: Scanner) -> Points:
     """Displace the vertices of a surface as a scan does, and fit it into the room again.
 
     Vertices at one place stay at one place, so nothing tears.

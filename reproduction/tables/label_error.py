@@ -173,7 +173,7 @@ def cost_record(
     seconds, peaks = 0.0, [0.0]
     for stage in stages_of(method):
         for split in splits:
-            folder = root / "groundtruth" / scene / size / stage / split
+            folder = root / "estimates" / scene / size / stage / split
             for batch, _ in enumerate(batch_records(root, scene, size, method, split)):
                 path, kind = folder / f"batch-{batch:03d}.json", dict[str, FiniteFloat]
                 facts = read_result(path, ["peak_memory_mb"], "estimate that batch again", kind)

@@ -38,7 +38,9 @@ def new_packed(out: Path, n_frames: int, input_px: int) -> Iterator[NDArray[np.u
         frames.flush()
 
 
-def pack_frames(sequences: list[Path], input_px: int, out: Path, view: View = "square") -> None:
+def pack_frames(
+    sequences: list[Path], input_px: int, out: Path, view: NetworkView = "square"
+) -> None:
     """Write the colour frames of sequences, in order, as one ``.npy``.
 
     Args:
@@ -81,7 +83,7 @@ def read_packed(path: Path) -> np.memmap[Any, np.dtype[np.uint8]]:
     return frames
 
 
-View = Literal["square", "whole"]
+NetworkView = Literal["square", "whole"]
 
 
 class Crop(NamedTuple):
@@ -93,7 +95,7 @@ class Crop(NamedTuple):
     top: int
 
 
-def crop_of(size: tuple[int, int], input_px: int, view: View = "square") -> Crop:
+def crop_of(size: tuple[int, int], input_px: int, view: NetworkView = "square") -> Crop:
     """Return what localizers see of a frame.
 
     Args:
@@ -110,7 +112,7 @@ def crop_of(size: tuple[int, int], input_px: int, view: View = "square") -> Crop
     return Crop(width, height, (width - input_px) // 2, (height - input_px) // 2)
 
 
-def fit_frame(image: Image.Image, input_px: int, view: View = "square") -> NDArray[np.uint8]:
+def fit_frame(image: Image.Image, input_px: int, view: NetworkView = "square") -> NDArray[np.uint8]:
     """Crop and resize an image to (input_px, input_px, 3) by :func:`crop_of`, averaging pixels."""
     width, height, left, top = crop_of(image.size, input_px, view)
     small = image.resize((width, height), Image.Resampling.BILINEAR)
@@ -134,7 +136,7 @@ def write_packed(
     records: list[Path],
     camera: CameraConfig,
     render: RenderConfig,
-    view: View,
+    view: NetworkView,
     out_frames: Path,
     detail: Path | None = None,
 ) -> None:

@@ -21,7 +21,7 @@ from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.frame_files import encode_png, is_archive, write_archive
 from synfeal.dataset.layer_files import mask_pixels, normal_pixels
-from synfeal.dataset.packed import View, fit_frame, new_packed
+from synfeal.dataset.packed import NetworkView, fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable, read_frames
 from synfeal.dataset.sequence_listing import (
     COLOR,
@@ -245,7 +245,7 @@ def render_packed(
     start: int,
     stop: int,
     input_px: int,
-    view: View,
+    view: NetworkView,
     render: RenderConfig,
     out_frames: Path,
     detail: Path | None = None,

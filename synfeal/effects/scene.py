@@ -27,7 +27,7 @@ from synfeal.mesh.standing import CLUTTER, Standing, refuse_larger, standing
 from synfeal.records.files import read_json
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Faces, Renderer, Rgb
-from synfeal.render.surface import Surface, SurfaceTable
+from synfeal.render.surface import SurfaceImage, SurfaceTable
 
 Array = NDArray[np.float64]
 REACH_M = 3.0  # from a path, sideways
@@ -136,7 +136,7 @@ class SceneRenderer(Renderer):
         renderer = self._ideal if self._full is None else self._solid
         return renderer.render_faces(world_from_cam)
 
-    def surface(self, world_from_cam: Array) -> Surface:
+    def surface(self, world_from_cam: Array) -> SurfaceImage:
         """Render normals and instances of the scene alone."""
         return self._surface_table.look_up(self.render_faces(world_from_cam), world_from_cam)
 

@@ -41,7 +41,7 @@ class State(IntEnum):
     OUTSIDE = 3
 
 
-class Seen(NamedTuple):
+class ProjectedPoints(NamedTuple):
     """Points in a frame.
 
     Attributes:
@@ -149,7 +149,7 @@ def look_for(
     depth: DepthImage,
     world_from_cam: Array,
     tolerance: float = TOLERANCE,
-) -> Seen:
+) -> ProjectedPoints:
     """Find points in a frame.
 
     Args:
@@ -169,4 +169,4 @@ def look_for(
     slack_m = np.maximum(ROUNDING_M, tolerance * expected_m)
     is_visible = depth.shows(pixel[inside], expected_m, slack_m)
     state[inside] = np.where(is_visible, State.VISIBLE, State.HIDDEN)
-    return Seen(pixel, state)
+    return ProjectedPoints(pixel, state)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render.base import DEFAULTS, Depth, Faces, Renderer, Rgb, Window, floor_share
-from synfeal.render.raycast_triangles import Floats, Points, TexturedTriangles, View
+from synfeal.render.raycast_triangles import Floats, Points, TexturedTriangles, Viewpoint
 
-Look = Callable[[View, Floats], NDArray[Any]]
+Look = Callable[[Viewpoint, Floats], NDArray[Any]]
 RAYS_AT_ONCE = 1 << 15  # 30 MB
 
 
@@ -69,7 +69,7 @@ class RaycastRenderer(Renderer):
         fx, fy, cx, cy = self._camera.intrinsics
         per_sample = step_px * pose[:3, :2].T / np.array([[fx], [fy]])
         origin_m = pose[:3, 3] - self._triangles.centre_m
-        view = View(origin_m, per_sample, self._camera.near_m, self._camera.far_m)
+        view = Viewpoint(origin_m, per_sample, self._camera.near_m, self._camera.far_m)
         left, top, right, bottom = self._window or (0, 0, width, height)
         every = np.arange(width * height).reshape(height, width)
         drawn = every[top:bottom, left:right].reshape(-1)
@@ -87,22 +87,22 @@ class RaycastRenderer(Renderer):
             pixels = image
         return pixels.reshape(height, width, *pixels.shape[1:])
 
-    def _points(self, view: View, rays: Floats) -> tuple[NDArray[np.intp], Points]:
+    def _points(self, view: Viewpoint, rays: Floats) -> tuple[NDArray[np.intp], Points]:
         """Find the rays that hit something, and what they hit."""
         face, about_m = self._triangles.first_drawn(view, rays)
         hit = np.flatnonzero(face >= 0)
         return hit, self._triangles.points(view, rays[hit], face[hit], about_m[hit])
 
-    def _depth(self, view: View, rays: Floats) -> Depth:
+    def _depth(self, view: Viewpoint, rays: Floats) -> Depth:
         hit, points = self._points(view, rays)
         depth_m = np.full(len(rays), np.inf, np.float32)
         depth_m[hit] = points.depth_m
         return depth_m
 
-    def _faces(self, view: View, rays: Floats) -> Faces:
+    def _faces(self, view: Viewpoint, rays: Floats) -> Faces:
         return self._triangles.face_of_mesh[self._triangles.first_drawn(view, rays)[0]]
 
-    def _colors(self, view: View, rays: Floats) -> Rgb:
+    def _colors(self, view: Viewpoint, rays: Floats) -> Rgb:
         hit, points = self._points(view, rays)
         rgb = np.tile(self._background, (len(rays), 1))
         rgb[hit] = self._triangles.rgb(view, points)

@@ -31,7 +31,7 @@ LEAST_ALPHA = 127.5  # of 255: what is left of cut-out textures after filtering
 MOST_LAYERS = 64  # that a ray passes before it counts as lost
 
 
-class View(NamedTuple):
+class Viewpoint(NamedTuple):
     """Viewpoint and pixel size of a look at triangles, in their frame."""
 
     origin_m: Floats  # (3,) position of the camera
@@ -68,7 +68,7 @@ class TexturedTriangles:
         self._has_cutouts = np.array([a.shape[2] == 4 for a in textures])[self._texture_of]
         self._textures = MipMaps(textures)
 
-    def first_drawn(self, view: View, rays: Floats) -> tuple[Faces, Floats]:
+    def first_drawn(self, view: Viewpoint, rays: Floats) -> tuple[Faces, Floats]:
         """Find the first triangle (N,) that shows on each ray, -1 for none, and its depth (N,).
 
         ``rays`` (N, 3) are of unit length along the optical axis.
@@ -88,7 +88,7 @@ class TexturedTriangles:
         face[depth_m > view.far_m] = -1
         return face, depth_m
 
-    def points(self, view: View, rays: Floats, face: Faces, depth_m: Floats) -> Points:
+    def points(self, view: Viewpoint, rays: Floats, face: Faces, depth_m: Floats) -> Points:
         """Intersect rays with the planes of triangles they are known to hit, in double precision.
 
         Args:
@@ -111,7 +111,7 @@ class TexturedTriangles:
         values = constant[:, 1:] + depth_m[:, None] * slope[:, 1:]
         return Points(rays, face, depth_m, values)
 
-    def _uv_per_px(self, view: View, points: Points) -> Floats:
+    def _uv_per_px(self, view: Viewpoint, points: Points) -> Floats:
         """Return derivatives (N, 4) of u and v along x and y: du/dx, dv/dx, du/dy, dv/dy."""
         gradient, depth_m = self._rows[points.face, :3, :3], points.depth_m
         slope = np.einsum("nkj,nj->nk", gradient, points.rays)
@@ -123,7 +123,7 @@ class TexturedTriangles:
             changes += [away * slope[:, k] + depth_m * turn[:, k] for k in (1, 2)]
         return np.stack(changes, axis=1)
 
-    def rgb(self, view: View, points: Points) -> Rgba:
+    def rgb(self, view: Viewpoint, points: Points) -> Rgba:
         """Look up colours (N, 3), 0 to 255."""
         tint = self._tint[self._part_of[points.face]]
         if points.values.shape[1] == 5:
@@ -136,7 +136,7 @@ class TexturedTriangles:
         along = np.einsum("nj,nj->n", normals, points.rays)
         return np.asarray(np.abs(along) / np.linalg.norm(points.rays, axis=1))
 
-    def _texel(self, view: View, points: Points) -> Rgba:
+    def _texel(self, view: Viewpoint, points: Points) -> Rgba:
         uv, uv_per_px = points.values[:, :2], self._uv_per_px(view, points)
         return self._textures.rgba(self._texture_of[self._part_of[points.face]], uv, uv_per_px)
 
@@ -144,7 +144,7 @@ class TexturedTriangles:
         """Mark rays that hit a face whose texture has a hole there."""
         return np.asarray((face >= 0) & self._has_cutouts[self._part_of[face]], np.bool_)
 
-    def _first_hits(self, view: View, rays: Floats, start_m: Floats) -> tuple[Faces, Floats]:
+    def _first_hits(self, view: Viewpoint, rays: Floats, start_m: Floats) -> tuple[Faces, Floats]:
         """Find the first triangles at depths beyond ``start_m`` (N,), and their depths."""
         origins = view.origin_m + start_m[:, None] * rays
         distance_m, face = self._caster.first_hits(origins, rays)

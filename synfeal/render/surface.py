@@ -34,7 +34,7 @@ class Layers(NamedTuple):
         return self.normals or self.masks
 
 
-class Surface(NamedTuple):
+class SurfaceImage(NamedTuple):
     """Surface that the pixels of a frame show.
 
     Attributes:
@@ -60,7 +60,7 @@ class SurfaceTable:
         self._ids = instances.of_faces(mesh)
         self._rays_cam = cell_directions(camera, camera.width, camera.height)
 
-    def look_up(self, faces: Faces, world_from_cam: NDArray[np.float64]) -> Surface:
+    def look_up(self, faces: Faces, world_from_cam: NDArray[np.float64]) -> SurfaceImage:
         """Return what the triangles of a frame are.
 
         Args:
@@ -70,4 +70,4 @@ class SurfaceTable:
         normals_cam = (self._normals_world @ world_from_cam[:3, :3])[faces]
         away = np.einsum("hwi,hwi->hw", normals_cam, self._rays_cam) > 0.0
         normals_cam[away] *= -1.0
-        return Surface(normals_cam.astype(np.float32) + np.float32(0.0), self._ids[faces])
+        return SurfaceImage(normals_cam.astype(np.float32) + np.float32(0.0), self._ids[faces])

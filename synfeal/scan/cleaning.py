@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from synfeal.scan.fusion import Surface
+from synfeal.scan.fusion import FusedSurface
 
 
-def without_small_pieces(surface: Surface, min_area_m2: float) -> tuple[Surface, int]:
+def without_small_pieces(surface: FusedSurface, min_area_m2: float) -> tuple[FusedSurface, int]:
     """Drop connected pieces that are smaller than an area.
 
     Args:
@@ -26,7 +26,7 @@ def without_small_pieces(surface: Surface, min_area_m2: float) -> tuple[Surface,
     area_m2 = np.bincount(piece, np.linalg.norm(sides, axis=1) / 2.0)
     kept = area_m2 >= min(min_area_m2, float(area_m2.max()))
     used, faces = np.unique(surface.faces[kept[piece]], return_inverse=True)
-    rest = Surface(
+    rest = FusedSurface(
         vertices_m=surface.vertices_m[used],
         normals=surface.normals[used],
         faces=faces.reshape(-1, 3).astype(np.int64),

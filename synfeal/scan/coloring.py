@@ -18,7 +18,7 @@ from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.scan.camera import RgbdCamera
-from synfeal.scan.fusion import Surface
+from synfeal.scan.fusion import FusedSurface
 from synfeal.scan.reading import read_color, read_depth_m
 from synfeal.scan.seen import project, sampled, seen_points, within
 
@@ -27,7 +27,7 @@ NEIGHBOURS = 4  # coloured vertices whose mean an uncoloured one takes
 
 
 def colors_of(
-    surface: Surface,
+    surface: FusedSurface,
     frames: PosedFrames,
     camera: RgbdCamera,
     on_frame: Callable[[], object] = lambda: None,

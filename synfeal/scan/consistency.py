@@ -25,7 +25,7 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.geometry.poses import inverse
 from synfeal.scan.camera import RgbdCamera
-from synfeal.scan.fusion import Surface
+from synfeal.scan.fusion import FusedSurface
 from synfeal.scan.reading import read_color, read_depth_m
 from synfeal.scan.seen import Floats, project, sampled, seen_points, within
 
@@ -90,7 +90,7 @@ def shrunk(camera: CameraConfig, factor: int) -> CameraConfig:
 
 
 def sightings_of(
-    surface: Surface,
+    surface: FusedSurface,
     frames: PosedFrames,
     camera: RgbdCamera,
     on_frame: Callable[[], object] = lambda: None,

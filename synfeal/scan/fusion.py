@@ -59,7 +59,7 @@ def fuse_depth(
 
 
 @dataclass(frozen=True)
-class Surface:
+class FusedSurface:
     """Triangles without colours, in the world of the sequence.
 
     Attributes:
@@ -79,7 +79,7 @@ def fuse(
     voxel_m: float,
     max_depth_m: float,
     on_frame: Callable[[], object] = lambda: None,
-) -> Surface:
+) -> FusedSurface:
     """Fuse the depth images of frames.
 
     Args:
@@ -130,7 +130,7 @@ def fuse(
         raise nothing
     legacy = mesh.to_legacy()
     legacy.compute_vertex_normals()
-    return Surface(
+    return FusedSurface(
         vertices_m=np.asarray(legacy.vertices, np.float64),
         normals=np.asarray(legacy.vertex_normals, np.float64),
         faces=np.asarray(legacy.triangles, np.int64),

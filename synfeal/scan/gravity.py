@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_matrix
-from synfeal.scan.fusion import Surface
+from synfeal.scan.fusion import FusedSurface
 
 Array = NDArray[np.float64]
 SAMPLES = 30_000
@@ -44,7 +44,7 @@ class Gravity:
     plumb: float
 
 
-def find_gravity(surface: Surface, world_from_cam: Array) -> Gravity:
+def find_gravity(surface: FusedSurface, world_from_cam: Array) -> Gravity:
     """Find the way up from the planes of a surface.
 
     Args:
@@ -84,7 +84,7 @@ def find_gravity(surface: Surface, world_from_cam: Array) -> Gravity:
     return found
 
 
-def area_weighted_normals(surface: Surface, count: int) -> Array:
+def area_weighted_normals(surface: FusedSurface, count: int) -> Array:
     """Draw unit normals (count, 3) of triangles in proportion to their area."""
     corners = surface.vertices_m[surface.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -126,7 +126,7 @@ def _refined(up: Array, normals: Array, window_rad: float) -> tuple[Array, float
     return np.asarray(best), float(value[1] - value[0])
 
 
-def upright_world(surface: Surface, up: Array) -> Array:
+def upright_world(surface: FusedSurface, up: Array) -> Array:
     """Place a world with z up, its floor at 0, its axes along the walls, the scene in its middle.
 
     Args:

@@ -26,7 +26,7 @@ from synfeal.scan.cleaning import without_small_pieces
 from synfeal.scan.coloring import colors_of
 from synfeal.scan.consistency import N_FRAMES as FIT_FRAMES
 from synfeal.scan.consistency import ColorFit, fit_color, sightings_of, spread, with_color
-from synfeal.scan.fusion import Surface, fuse
+from synfeal.scan.fusion import FusedSurface, fuse
 from synfeal.scan.gravity import Gravity, find_gravity, upright_world
 from synfeal.scan.picture import Comparison, compare, write_picture
 from synfeal.scan.reading import image_size
@@ -204,7 +204,9 @@ def _camera(job: ScanJob, frames: PosedFrames) -> RgbdCamera:
     )
 
 
-def _world(job: ScanJob, surface: Surface, frames: PosedFrames) -> tuple[Gravity | None, Array]:
+def _world(
+    job: ScanJob, surface: FusedSurface, frames: PosedFrames
+) -> tuple[Gravity | None, Array]:
     """Return how gravity was found, if it was, and ``sequence_from_world`` (4, 4)."""
     if job.gravity == "keep":
         return None, np.eye(4)
@@ -215,7 +217,9 @@ def _world(job: ScanJob, surface: Surface, frames: PosedFrames) -> tuple[Gravity
     return None, upright_world(surface, -down / np.linalg.norm(down))
 
 
-def _mesh(surface: Surface, rgb: NDArray[np.uint8], sequence_from_world: Array) -> TexturedMesh:
+def _mesh(
+    surface: FusedSurface, rgb: NDArray[np.uint8], sequence_from_world: Array
+) -> TexturedMesh:
     world_from_sequence = inverse(sequence_from_world)
     vertices = surface.vertices_m @ world_from_sequence[:3, :3].T + world_from_sequence[:3, 3]
     return TexturedMesh((MeshPart("scan", vertices, surface.faces, vertex_rgb=rgb),))

@@ -25,7 +25,7 @@ MARGIN_PX = 4.0  # depth at the border of the image is poor
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenPoints:
     """Points that one frame sees.
 
     Attributes:
@@ -45,7 +45,7 @@ def seen_points(
     depth_m: Depth,
     depth_camera: CameraConfig,
     world_from_depth: Array,
-) -> Seen:
+) -> SeenPoints:
     """Find the points that a depth image confirms.
 
     Args:
@@ -70,7 +70,7 @@ def seen_points(
     towards = normals[index] @ depth_from_world[:3, :3].T
     cosine = -np.einsum("ni,ni->n", towards, local) / np.linalg.norm(local, axis=1)
     faces_us = cosine > MIN_COSINE
-    return Seen(index[faces_us], local[faces_us], cosine[faces_us])
+    return SeenPoints(index[faces_us], local[faces_us], cosine[faces_us])
 
 
 def project(local_m: Floats, camera: CameraConfig) -> Floats:

@@ -33,7 +33,7 @@ from synfeal.validation.listing import (
     read_depth_mm,
 )
 from synfeal.validation.poses import GAPS
-from synfeal.validation.reprojection import Residual, View, camera_normal, compare
+from synfeal.validation.reprojection import ComparedFrame, Residual, camera_normal, compare
 
 GRID_PIXELS = 5000  # of each frame are moved to the other one
 MIN_OVERLAP = 0.2
@@ -189,7 +189,7 @@ def _view(
     camera: KnownCamera,
     color: str = COLOR,
     depth: str = DEPTH,
-) -> View | None:
+) -> ComparedFrame | None:
     """Read a frame; None if it is unreadable or of another size, as other checks report.
 
     Colours are those of the pixels of depth, whichever camera took them.
@@ -207,7 +207,7 @@ def _view(
         grey = _registered(grey, camera.config, camera.of_depth)
     known = (depth_mm > 0) & (depth_mm < 65535)
     depth_m = np.where(known, depth_mm.astype(np.float32) / 1000.0, np.float32(np.inf))
-    return View(world_from_cam, depth_m, grey)
+    return ComparedFrame(world_from_cam, depth_m, grey)
 
 
 def _registered(

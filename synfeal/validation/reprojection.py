@@ -34,7 +34,7 @@ MAX_SHIFT_ERROR_PX = 0.05
 
 
 @dataclass(frozen=True)
-class View:
+class ComparedFrame:
     """One frame."""
 
     world_from_cam: Array  # (4, 4)
@@ -77,7 +77,7 @@ class Residual:
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _Reprojected:
     """The pixels of a that b sees: predicted depth, depth and grey of b there, its gradient."""
 
     mask: NDArray[np.bool_]
@@ -88,7 +88,7 @@ class _Seen:
     gradient: Array
 
 
-def compare(a: View, b: View, lens: Lens) -> Residual | None:
+def compare(a: ComparedFrame, b: ComparedFrame, lens: Lens) -> Residual | None:
     """Compute the residuals of a pair; None if b sees fewer than ``MIN_PIXELS`` of a's grid."""
     seen = _look(a, b, lens)
     if np.count_nonzero(seen.mask) < MIN_PIXELS:
@@ -112,7 +112,7 @@ def compare(a: View, b: View, lens: Lens) -> Residual | None:
     )
 
 
-def _look(a: View, b: View, lens: Lens) -> _Seen:
+def _look(a: ComparedFrame, b: ComparedFrame, lens: Lens) -> _Reprojected:
     """Move the grid of a into b and read b there."""
     depth = a.depth_m[lens.rows, lens.columns].astype(np.float64)
     b_from_a = relative(b.world_from_cam, a.world_from_cam)
@@ -137,7 +137,7 @@ def _look(a: View, b: View, lens: Lens) -> _Seen:
     tolerance = ROUNDING_M * (1.0 + np.abs(magnified)) + off_plane + lens.curvature * seen
     tolerance += POSE_ROUNDING * max(np.abs(v.world_from_cam[:3, 3]).max() for v in (a, b))
     grey, gradient = _interpolate(b.grey, corner, fraction)
-    return _Seen(mask, lens.depth_of(points), seen, tolerance, grey, gradient)
+    return _Reprojected(mask, lens.depth_of(points), seen, tolerance, grey, gradient)
 
 
 def _magnification(
@@ -200,7 +200,9 @@ def _shift_px(grey_error: Array, gradient: Array, place: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(moved**2, axis=0))))
 
 
-def camera_normal(a: View, b: View, lens: Lens, moved: Sequence[Lens], delta: Array) -> Array:
+def camera_normal(
+    a: ComparedFrame, b: ComparedFrame, lens: Lens, moved: Sequence[Lens], delta: Array
+) -> Array:
     """Build the normal equations of errors in depth against the parameters of the camera.
 
     Args:

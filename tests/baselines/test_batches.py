@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from baselines.config.labels import GroundTruthConfig
+from baselines.config.labels import EstimationConfig
 from baselines.labels.batches import BatchTrajectory, batches_of, failed_trajectory
 from baselines.labels.chain import chain_batches, chain_unassisted, summary_of
 from synfeal.geometry.poses import pose_matrix, relative
 from tests.support.property_support import table_of
 
-CFG = GroundTruthConfig(batch_frames=5)
+CFG = EstimationConfig(batch_frames=5)
 
 
 def straight_truth(count):
@@ -46,7 +46,7 @@ def test_an_error_as_large_as_the_threshold_is_none():
 
     def assisted(limit_m, limit_deg):
         limits = {"assist_position_m": limit_m, "assist_orientation_deg": limit_deg}
-        cfg = GroundTruthConfig(batch_frames=5, **limits)
+        cfg = EstimationConfig(batch_frames=5, **limits)
         return chain_batches(batches, [off], truth, cfg)[1][0].assisted
 
     assert error_deg == pytest.approx(7.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from baselines.config.labels import GroundTruthConfig
+from baselines.config.labels import EstimationConfig
 from baselines.labels import methods
 from baselines.labels.batches import batches_of, read_trajectory, write_trajectory
 from baselines.labels.chain import chain_batches, summary_of
@@ -13,7 +13,7 @@ from baselines.labels.rgbd import rgbd_graph
 from baselines.labels.sfm import sfm_batch
 from tests.support.room_scene import CAMERA, straight_path, write_planes
 
-CFG = GroundTruthConfig(batch_frames=6, sfm={"max_features": 400}, rgbd={"keyframe_every": 3})
+CFG = EstimationConfig(batch_frames=6, sfm={"max_features": 400}, rgbd={"keyframe_every": 3})
 TRUTH = straight_path(10, step_m=0.06, turn_deg=1.5)
 BATCHES = batches_of(len(TRUTH), CFG.batch_frames)
 

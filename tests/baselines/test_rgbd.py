@@ -255,7 +255,7 @@ def test_only_a_motion_that_nothing_constrains_is_none(monkeypatch):
         raise RuntimeError("[Open3D Error] out of memory")
 
     shape = (30, 40, 3)
-    flat = frames.Surface(
+    flat = frames.ScaledPoints(
         points=o3d.core.Tensor(np.full(shape, np.nan, np.float32)),
         normals=o3d.core.Tensor(np.full(shape, np.nan, np.float32)),
         intrinsics=o3d.core.Tensor(np.diag([50.0, 50.0, 1.0])),

@@ -206,9 +206,9 @@ def test_a_label_set_says_which_truth_placed_its_batches(tmp_path, used):
         test_batches=files,
         train_truth=tmp_path / "truth.csv",
         test_truth=tmp_path / "truth.csv",
-        groundtruth=CFG,
+        estimation=CFG,
         truth_used=str(used),
-        estimation={},
+        parameters={},
         **{f"out_{name}": tmp_path / f"{name}.out" for name in names},
     )
     assert json.loads((tmp_path / "assistance.out").read_text())["truth_used"] == str(used)
@@ -217,7 +217,7 @@ def test_a_label_set_says_which_truth_placed_its_batches(tmp_path, used):
 
 
 def test_the_gauge_decides_which_truth_sfm_uses():
-    given = load_config(REPOSITORY / "config/config.yaml").groundtruth
+    given = load_config(REPOSITORY / "config/config.yaml").estimation
     assert truth_used(given, "sfm") == "first 44 poses"
     assert truth_used(given, "rgbd-toro") == truth_used(given, "kinect-fusion") == "none"
     sfm = given.sfm.model_copy(update={"gauge": "first_camera"})

@@ -95,7 +95,7 @@ TRAINS = """
 import sys
 from pathlib import Path
 import numpy as np
-from baselines.config.labels import GroundTruthConfig
+from baselines.config.labels import EstimationConfig
 from baselines.config.learning import hyper_of
 from baselines.labels.injected import with_error
 from baselines.labels.methods import estimate_batch
@@ -130,7 +130,7 @@ np.testing.assert_allclose(position_m, 0.3)
 np.testing.assert_allclose(np.degrees(orientation_rad), 20)
 
 paths = [Path(f"{k}.png") for k in range(5)]
-found, _ = estimate_batch("constant", paths, paths, CameraConfig(), GroundTruthConfig(), 0)
+found, _ = estimate_batch("constant", paths, paths, CameraConfig(), EstimationConfig(), 0)
 np.testing.assert_array_equal(found.first_from_cam, np.tile(np.eye(4), (5, 1, 1)))
 
 names = ("train", "test", "train_truth", "test_truth")

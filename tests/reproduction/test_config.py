@@ -152,17 +152,17 @@ def test_further_scenes_are_labelled_as_the_rows_are():
     methods = [row.labels for row in own]
     rooms = ("large_room", "sanctuary")
     assert design.estimated == [(room, "6k", method) for room in rooms for method in methods]
-    groundtruth = config.groundtruth.model_copy(update={"more_scenes": ("attic",)})
+    estimation = config.estimation.model_copy(update={"more_scenes": ("attic",)})
     with pytest.raises(InputError, match=r"more_scenes: 'attic': .* no row of size '6k'"):
-        read_design(config.model_copy(update={"groundtruth": groundtruth}))
+        read_design(config.model_copy(update={"estimation": estimation}))
 
 
 def test_a_run_of_one_table_leaves_out_further_scenes_that_it_has_no_rows_of():
     config = load_config(CONFIG / "config.yaml", CONFIG / "night.yaml")
     alone = read_design(config.model_copy(update={"tables": ("table2_ground_truth",)}))
     assert {scene for scene, _, _ in alone.estimated} == {"large_room"}
-    groundtruth = config.groundtruth.model_copy(update={"more_scenes": ("attic",)})
-    wrong = {"groundtruth": groundtruth, "tables": ("table2_ground_truth",)}
+    estimation = config.estimation.model_copy(update={"more_scenes": ("attic",)})
+    wrong = {"estimation": estimation, "tables": ("table2_ground_truth",)}
     with pytest.raises(InputError, match="more_scenes: 'attic'"):
         read_design(config.model_copy(update=wrong))
 
@@ -198,7 +198,7 @@ def test_the_codes_dose_is_tried_on_nights_table_3_with_fresh_seeds():
     night, dose = (
         load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml") for name in ("night", "dose")
     )
-    assert (night.groundtruth.noise_dose, dose.groundtruth.noise_dose) == ("text", "code")
+    assert (night.estimation.noise_dose, dose.estimation.noise_dose) == ("text", "code")
     assert read_design(dose).rows == tuple(read_design(night).rows_of("table3_inconsistencies"))
     assert read_design(dose).repetitions["default"] == 3
     for part in ("scenes", "render", "network", "network_camera", "localizers"):
@@ -215,13 +215,13 @@ def test_the_codes_dose_is_tried_on_nights_table_3_with_fresh_seeds():
 
 def test_a_dose_changes_what_a_profile_is_known_by():
     mini = profile("mini")
-    groundtruth = mini.groundtruth.model_copy(update={"noise_dose": "code"})
-    other = mini.model_copy(update={"groundtruth": groundtruth})
+    estimation = mini.estimation.model_copy(update={"noise_dose": "code"})
+    other = mini.model_copy(update={"estimation": estimation})
     assert config_hash(mini) != config_hash(other)
     assert read_design(mini).model_dump() != read_design(other).model_dump()
-    with pytest.raises(InputError, match=r"groundtruth\.noise_dose: .*'text' or 'code'"):
+    with pytest.raises(InputError, match=r"estimation\.noise_dose: .*'text' or 'code'"):
         parse_config(
-            merge(read_yaml(CONFIG / "config.yaml"), {"groundtruth": {"noise_dose": "print"}}),
+            merge(read_yaml(CONFIG / "config.yaml"), {"estimation": {"noise_dose": "print"}}),
             "my.yaml",
         )
 

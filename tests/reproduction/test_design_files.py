@@ -35,7 +35,7 @@ def test_one_row_needs_its_scene_five_runs_and_no_large_frame():
     }
     assert len(jobs["train"]) == 5
     assert not {"render", "dataset", "sfm", "rgbd", "chain", "features", "assistance"} & set(jobs)
-    assert files.manifests("groundtruth") == []
+    assert files.manifests("estimation") == []
     assert files.label_tables == ()
 
 
@@ -46,7 +46,7 @@ def test_an_estimated_row_adds_its_batches_and_large_frames():
     counts = {"train": 3, "test": 2}
     assert batches == [(s, f"00{b}") for s, count in counts.items() for b in range(count)]
     assert jobs["chain"] == [{"scene": "large_room", "size": "6k", "reconstructed": "sfm"}]
-    assert {job["camera"] for job in jobs["render"]} == {"groundtruth"}
+    assert {job["camera"] for job in jobs["render"]} == {"estimation"}
     assert "rgbd" not in jobs
     assert len(jobs["train"]) == 10
 
@@ -58,8 +58,8 @@ def test_structure_on_all_sizes_needs_large_frames_and_no_estimated_labels():
     jobs = jobs_of_run(files)
     assert not {"sfm", "rgbd", "chain"} & set(jobs)
     # Those of the larger size, of which the smaller one has the first.
-    assert files.n_frames("large_room", "groundtruth", "train") == 200
-    drawn = [files.sequence("large_room", "groundtruth", job["sequence"]) for job in jobs["render"]]
+    assert files.n_frames("large_room", "estimation", "train") == 200
+    drawn = [files.sequence("large_room", "estimation", job["sequence"]) for job in jobs["render"]]
     assert sum(len(sequence) for sequence in drawn if sequence.split == "train") == 200
     assert {(job["size"], job["split"]) for job in jobs["features"]} == {
         (size, split) for size in ("6k", "20k") for split in ("train", "test")

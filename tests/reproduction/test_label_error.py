@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from baselines.config.labels import GroundTruthConfig
+from baselines.config.labels import EstimationConfig
 from baselines.labels.batches import (
     BatchTrajectory,
     batches_of,
@@ -28,7 +28,7 @@ from tests.support.property_support import table_of
 from tests.support.report_results import design_of, experiment
 
 STEP_M, BATCH = 0.1, 10
-CFG = GroundTruthConfig(batch_frames=BATCH)
+CFG = EstimationConfig(batch_frames=BATCH)
 
 
 def straight(n_frames, step_m=STEP_M, turn_deg=0.0):
@@ -148,7 +148,7 @@ def results(tmp_path):
             for batch in batches:
                 for stage in stages_of(method):
                     facts = {"odometry_s": 2.0, "loops_s": 5.0, "pairs": 9, "peak_memory_mb": 7.0}
-                    at = root / "groundtruth/large_room/6k" / stage / split
+                    at = root / "estimates/large_room/6k" / stage / split
                     write_json(at / f"batch-{batch.index:03d}.json", facts)
         write_assistance(folder / method / "assistance.json", method, records)
         rows.append(experiment("table2_ground_truth", labels=method))
@@ -199,7 +199,7 @@ def test_a_frame_costs_what_its_stages_took_and_each_method_has_a_row(results):
 @pytest.mark.parametrize("content", [None, "[]", '{"peak_memory_mb": "much"}'])
 def test_facts_that_cannot_be_read_are_named(results, content):
     root, rows = results
-    path = root / "groundtruth/large_room/6k/sfm/test/batch-000.json"
+    path = root / "estimates/large_room/6k/sfm/test/batch-000.json"
     path.unlink()
     if content is not None:
         path.write_text(content)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.config.labels import GroundTruthConfig, PoseGraphConfig
+from baselines.config.labels import EstimationConfig, PoseGraphConfig
 from baselines.labels import methods
 from baselines.labels.batches import batches_of
 from baselines.labels.chain import chain_batches
@@ -21,7 +21,7 @@ from tests import ROOT
 from tests.support.added_methods import examples
 from tests.support.room_scene import straight_path
 
-CAMERA, CFG = CameraConfig(), GroundTruthConfig(batch_frames=10)
+CAMERA, CFG = CameraConfig(), EstimationConfig(batch_frames=10)
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def test_every_method_has_a_title_a_style_and_someone_who_runs_it():
         assert name in METHOD_STYLES
     own_rules = set(METHODS) - {*methods.frame_methods(), *methods.graph_methods()}
     assert own_rules == {"sfm"}
-    rules = (ROOT / "workflow/rules/groundtruth.smk").read_text()
+    rules = (ROOT / "workflow/rules/estimation.smk").read_text()
     assert all(f"rule {name}:" in rules for name in own_rules)
 
 

@@ -110,7 +110,7 @@ def test_a_design_of_one_table_plans_that_table_alone(table, tmp_path):
     """Each of the other tables is empty, and those of estimated labels but with Table 2."""
     changes, labels_and_start = ROWS[table]
     row = {"table": table, "scene": "my_room", "size": "small", **changes}
-    camera = {"groundtruth_camera": {"width": 64, "height": 48}}
+    camera = {"estimation_camera": {"width": 64, "height": 48}}
     jobs = jobs_of(dry_run(own_profile(tmp_path, experiments=[row], tables=None, **camera)))
     assert {job for job in jobs if re.match("tables/table[2-9]", job)} == {f"tables/{table}"}
     assert f"train/my_room/small/{labels_and_start}/posenet2/seed0" in jobs

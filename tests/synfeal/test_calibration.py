@@ -202,8 +202,8 @@ def test_values_beside_a_calibration_must_agree(tmp_path, values, words):
 def test_depth_methods_refuse_a_distorted_camera(monkeypatch, tmp_path):
     monkeypatch.chdir(CONFIG.parent)
     config = load_config(CONFIG / "config.yaml")
-    camera = config.groundtruth_camera.model_copy(update={"distortion": LENS})
-    distorted = config.model_copy(update={"groundtruth_camera": camera})
+    camera = config.estimation_camera.model_copy(update={"distortion": LENS})
+    distorted = config.model_copy(update={"estimation_camera": camera})
     with pytest.raises(InputError, match=r"experiments\.csv: row \d+: labels 'rgbd.*distortion"):
         read_experiments(distorted)
     rows = config.experiments.read_text().splitlines(keepends=True)

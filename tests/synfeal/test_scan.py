@@ -21,7 +21,7 @@ from synfeal.geometry.poses import inverse, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.load import load_mesh
 from synfeal.scan.cleaning import without_small_pieces
-from synfeal.scan.fusion import Surface
+from synfeal.scan.fusion import FusedSurface
 from synfeal.scan.gravity import find_gravity
 from tests.support.scan_sequence import (
     COLOR_PX,
@@ -223,9 +223,9 @@ def test_given_gravity_and_kept_axes(sequence: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(kept, np.eye(4))
 
 
-def surface_of(vertices: Any, faces: Any) -> Surface:
+def surface_of(vertices: Any, faces: Any) -> FusedSurface:
     vertices = np.asarray(vertices, np.float64)
-    return Surface(vertices, np.zeros_like(vertices), np.asarray(faces, np.int64))
+    return FusedSurface(vertices, np.zeros_like(vertices), np.asarray(faces, np.int64))
 
 
 def test_a_ball_has_no_gravity() -> None:

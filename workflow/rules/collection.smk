@@ -142,7 +142,7 @@ rule render:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         start=lambda w: FILES.sequence(w.scene, w.camera, w.sequence).start,
         stop=lambda w: FILES.sequence(w.scene, w.camera, w.sequence).stop,
-        with_depth=lambda w: w.camera == "groundtruth" or CONFIG.network_depth,
+        with_depth=lambda w: w.camera == "estimation" or CONFIG.network_depth,
         with_normals=lambda w: w.camera == "network" and CONFIG.network_normals,
         with_masks=lambda w: w.camera == "network" and CONFIG.network_masks,
         render=dump(CONFIG.render),

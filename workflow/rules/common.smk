@@ -22,6 +22,7 @@ from reproduction.design.files import SPLITS, Files
 from reproduction.design.jobs import jobs_of_run
 from reproduction.design.labels import check_sources, estimation_parameters
 from reproduction.design.runs import training_parameters
+from reproduction.runs.renamed import refuse_old_names
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.config.load import read_yaml
 from synfeal.dataset.frame_files import SUFFIX
@@ -43,6 +44,7 @@ try:
     if not workflow.storage_settings.default_storage_provider:
         check_mesh_files(CONFIG.scenes)
     check_results(CONFIG.root)
+    refuse_old_names(CONFIG.root)
     DESIGN = read_design(CONFIG)
     check_sources(DESIGN.rows, design_name(CONFIG))
 except InputError as error:
@@ -57,7 +59,7 @@ JOBS = jobs_of_run(FILES)
 wildcard_constraints:
     scene="|".join(CONFIG.scenes),
     split="train|test",
-    camera="network|groundtruth",
+    camera="network|estimation",
     sequence=r"seq-\d+",
     batch=r"\d+",
     init="|".join(get_args(Init)),

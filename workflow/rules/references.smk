@@ -38,7 +38,7 @@ rule features:
     input:
         sequences=lambda w: FILES.sequence_dirs(
             w.scene,
-            "groundtruth",
+            "estimation",
             w.split,
             CONFIG.n_frames(w.scene, w.size, w.split),
         ),
@@ -55,7 +55,7 @@ rule features:
         mem_mb=grown(3000),
     params:
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
-        camera=dump(CONFIG.groundtruth_camera),
+        camera=dump(CONFIG.estimation_camera),
         references=dump(CONFIG.references, include={"max_features", "contrast"}),
     script:
         "../scripts/run_features.py"
@@ -148,7 +148,7 @@ use rule image_references as structure_references with:
         mem_mb=grown(3000),
     params:
         group="structure",
-        camera=dump(CONFIG.groundtruth_camera),
+        camera=dump(CONFIG.estimation_camera),
 
 
 # In jobs of their own, as these take longer and are asked of fewer label sets.
@@ -184,7 +184,7 @@ rule views:
         mem_mb=grown(2000),
     params:
         n_frames=lambda w: CONFIG.n_frames(w.scene, w.size, w.split),
-        camera=dump(CONFIG.groundtruth_camera),
+        camera=dump(CONFIG.estimation_camera),
         side=(CONFIG.network_camera.width, CONFIG.network_camera.height),
     script:
         "../scripts/run_views.py"

@@ -131,7 +131,7 @@ rule varied_structure:
     params:
         n_test=FILES.robust_frames("test"),
         sample=CONFIG.robustness.structure_frames,
-        camera=dump(CONFIG.groundtruth_camera),
+        camera=dump(CONFIG.estimation_camera),
         render=lambda w: dump(FILES.varied_render(w.effects)),
         references=dump(
             CONFIG.references, include={"max_features", "contrast", "retrieved"}

@@ -11,7 +11,7 @@ run_job(
     start=snakemake.params.start,
     stop=snakemake.params.stop,
     camera=snakemake.params.camera,
-    groundtruth=snakemake.params.groundtruth,
+    estimation=snakemake.params.estimation,
     seed=snakemake.params.seed,
     out_trajectory=snakemake.output.trajectory,
     out_facts=snakemake.output.facts,

@@ -59,7 +59,7 @@ _SMOOTHING = (5, 5.0, 10.0)
 
 
 @dataclass(frozen=True)
-class Surface:
+class ScaledPoints:
     """Points and normals (h, w, 3) of a depth image at one scale, nan where there is none."""
 
     points: o3d.core.Tensor
@@ -68,7 +68,7 @@ class Surface:
 
 
 # By stride.
-Surfaces = dict[int, Surface]
+PointsByStride = dict[int, ScaledPoints]
 
 
 def near(a: Array, b: Array, max_m: float = MAX_CHANGE_M, max_deg: float = MAX_CHANGE_DEG) -> bool:
@@ -84,13 +84,13 @@ def near(a: Array, b: Array, max_m: float = MAX_CHANGE_M, max_deg: float = MAX_C
     return bool(change_m <= max_m and np.degrees(change_rad) <= max_deg)
 
 
-def _surface(depth_m: NDArray[np.float32], matrix: Array, stride: int) -> Surface:
+def _surface(depth_m: NDArray[np.float32], matrix: Array, stride: int) -> ScaledPoints:
     """Build one scale; pixel (0, 0) stays where it is, so focal lengths and centre shrink alike."""
     pixels = np.ascontiguousarray(depth_m[::stride, ::stride])
     image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(pixels))
     intrinsics = o3d.core.Tensor.from_numpy(np.diag([1 / stride, 1 / stride, 1]) @ matrix)
     smooth = image.filter_bilateral(*_SMOOTHING).create_vertex_map(intrinsics, np.nan)
-    return Surface(
+    return ScaledPoints(
         image.create_vertex_map(intrinsics, np.nan).as_tensor(),
         smooth.create_normal_map(np.nan).as_tensor(),
         intrinsics,
@@ -101,7 +101,9 @@ def _surface(depth_m: NDArray[np.float32], matrix: Array, stride: int) -> Surfac
 SINGULAR = "Singular 6x6 linear system"
 
 
-def align(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> Array | None:
+def align(
+    i: PointsByStride, j: PointsByStride, start: Array, max_difference_m: float
+) -> Array | None:
     """Register frame j to frame i by point-to-plane distances.
 
     Args:
@@ -116,7 +118,9 @@ def align(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> Ar
     return motion_or_none(lambda: _aligned(i, j, start, max_difference_m))
 
 
-def _aligned(i: Surfaces, j: Surfaces, start: Array, max_difference_m: float) -> o3d.core.Tensor:
+def _aligned(
+    i: PointsByStride, j: PointsByStride, start: Array, max_difference_m: float
+) -> o3d.core.Tensor:
     """Register as :func:`align` does; raise what Open3D raises."""
     i_from_j = o3d.core.Tensor.from_numpy(np.ascontiguousarray(start))
     for stage in STAGES:
@@ -180,8 +184,8 @@ class RgbdFrame:
         return o3d.t.geometry.RGBDImage(open3d_image(self.color), open3d_depth(self.depth_m))
 
     @cached_property
-    def surfaces(self) -> Surfaces:
-        """Surfaces seen in the depth image, by stride of the registration's stages."""
+    def surfaces(self) -> PointsByStride:
+        """Points seen in the depth image, by stride of the registration's stages."""
         measured = np.where(np.isfinite(self.depth_m), self.depth_m, np.float32(np.nan))
         matrix = self.camera.intrinsics.matrix(centre_shift_px=-0.5)
         strides = {stage.stride for stage in STAGES}

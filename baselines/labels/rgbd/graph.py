@@ -16,7 +16,7 @@ from baselines.labels.rgbd.dense import DenseOdometry
 from baselines.labels.rgbd.frames import read_frame
 from baselines.labels.rgbd.tracks import (
     FeatureOdometry,
-    View,
+    TrackedFrame,
     closure,
     loop_candidates,
     most_telling,
@@ -45,7 +45,7 @@ class _Track:
     first_from_cam: Array
     edges: list[Edge]
     guesses: NDArray[np.int64]
-    keyframes: dict[int, View]
+    keyframes: dict[int, TrackedFrame]
 
 
 def write_rgbd(
@@ -130,10 +130,10 @@ def _odometry(
     """Chain the motions of neighbours; only keyframes stay in memory."""
     dense, by_features = DenseOdometry(camera, cfg), FeatureOdometry(camera)
     poses, edges, guesses, motion = [np.eye(4)], [], [0], np.eye(4)
-    keyframes: dict[int, View] = {}
-    before: View | None = None
+    keyframes: dict[int, TrackedFrame] = {}
+    before: TrackedFrame | None = None
     for j, (color, depth) in enumerate(zip(color_paths, depth_paths, strict=True)):
-        view = View(read_frame(color, depth, camera, cfg, seed), dense, by_features)
+        view = TrackedFrame(read_frame(color, depth, camera, cfg, seed), dense, by_features)
         if before is not None:
             motion, accepted = neighbour(before, view, motion)
             poses.append(poses[-1] @ motion)

@@ -99,7 +99,7 @@ _MIN_INLIERS, _MIN_LOOP_INLIERS = 8, 12
 
 
 @dataclass(frozen=True)
-class View:
+class TrackedFrame:
     """A frame and what is found out about it once, when it is needed."""
 
     frame: RgbdFrame
@@ -117,13 +117,13 @@ class View:
         """Check that dense odometry can tell every motion from this view."""
         return self.dense.constrained(self.frame)
 
-    def from_features(self, other: View, min_inliers: int) -> Array | None:
+    def from_features(self, other: TrackedFrame, min_inliers: int) -> Array | None:
         """Find the motion ``self_from_other`` (4, 4) by features alone, or None."""
         found = self.by_features.motion(self.features, other.features)
         return found[0] if found and found[1] >= min_inliers else None
 
 
-def neighbour(i: View, j: View, previous: Array) -> tuple[Array, bool]:
+def neighbour(i: TrackedFrame, j: TrackedFrame, previous: Array) -> tuple[Array, bool]:
     """Find the motion between neighbours by depth or, where that cannot tell it, by features.
 
     Args:
@@ -152,7 +152,7 @@ def neighbour(i: View, j: View, previous: Array) -> tuple[Array, bool]:
     return max(candidates, key=lambda motion: motion.agreement).i_from_j, True
 
 
-def _by_features(i: View, j: View, previous: Array) -> tuple[Array, bool]:
+def _by_features(i: TrackedFrame, j: TrackedFrame, previous: Array) -> tuple[Array, bool]:
     """Estimate a motion by features alone in front of a surface that depth slides along.
 
     Open3D compares colours at whole pixels and would move it away again.
@@ -163,7 +163,7 @@ def _by_features(i: View, j: View, previous: Array) -> tuple[Array, bool]:
     return found, i.dense.overlap(i.frame, j.frame, found) > 0
 
 
-def closure(i: View, j: View, predicted: Array | None) -> Array | None:
+def closure(i: TrackedFrame, j: TrackedFrame, predicted: Array | None) -> Array | None:
     """Find the motion between two keyframes that may view the same place.
 
     Args:

@@ -22,7 +22,7 @@ TIMED = {
     "scenes/*/render_speed.csv": "times of frames",
     "scenes/*/collision_curve.csv": "times of rays",
     "tables/speed_vs_error.csv": "times",
-    "groundtruth/*.json": "what stages of a batch took",
+    "estimates/*.json": "what stages of a batch took",
     "figures/speed_vs_error*": "shows times",
 }
 # Parts of files that say so; what is compared is the rest.

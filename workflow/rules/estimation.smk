@@ -3,7 +3,7 @@
 ESTIMATED = f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}"
 TRUE = f"{ROOT}/labels/{{scene}}/{{size}}/synfeal"
 ERRONEOUS = "{scene}/{size}/{error_kind}-p{noise_m}-r{noise_deg}/{split}"
-STEM = f"{ROOT}/groundtruth/{{scene}}/{{size}}"
+STEM = f"{ROOT}/estimates/{{scene}}/{{size}}"
 BATCH = "{split}/batch-{batch}"
 BATCH_LOG = "{scene}/{size}/{split}/batch-{batch}"
 
@@ -26,7 +26,7 @@ rule erroneous_labels:
         seed=lambda w: seed_of(
             CONFIG.seed, *seed_names(w.error_kind, w.split), w.scene, w.size
         ),
-        dose=CONFIG.groundtruth.noise_dose,
+        dose=CONFIG.estimation.noise_dose,
     script:
         "../scripts/run_erroneous_labels.py"
 
@@ -49,8 +49,8 @@ rule sfm:
     params:
         start=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).start,
         stop=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).stop,
-        camera=dump(CONFIG.groundtruth_camera),
-        sfm=dump(CONFIG.groundtruth.sfm),
+        camera=dump(CONFIG.estimation_camera),
+        sfm=dump(CONFIG.estimation.sfm),
         seed=lambda w: seed_of(CONFIG.seed, "sfm", w.scene, w.size, w.split, w.batch),
     script:
         "../scripts/run_sfm.py"
@@ -73,8 +73,8 @@ rule rgbd:
     params:
         start=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).start,
         stop=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).stop,
-        camera=dump(CONFIG.groundtruth_camera),
-        rgbd=dump(CONFIG.groundtruth.rgbd),
+        camera=dump(CONFIG.estimation_camera),
+        rgbd=dump(CONFIG.estimation.rgbd),
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
     script:
         "../scripts/run_rgbd.py"
@@ -97,9 +97,9 @@ rule estimate:
     params:
         start=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).start,
         stop=lambda w: FILES.batch(w.scene, w.size, w.split, w.batch).stop,
-        camera=dump(CONFIG.groundtruth_camera),
-        groundtruth=lambda w: dump(
-            CONFIG.groundtruth, include={METHODS[w.frame_method].settings}
+        camera=dump(CONFIG.estimation_camera),
+        estimation=lambda w: dump(
+            CONFIG.estimation, include={METHODS[w.frame_method].settings}
         ),
         seed=lambda w: seed_of(CONFIG.seed, "depth-sensor", w.scene),
     script:
@@ -121,7 +121,7 @@ rule posegraph:
     resources:
         mem_mb=grown(2000),
     params:
-        posegraph=dump(CONFIG.groundtruth.posegraph),
+        posegraph=dump(CONFIG.estimation.posegraph),
     script:
         "../scripts/run_posegraph.py"
 
@@ -152,11 +152,11 @@ rule chain:
     resources:
         mem_mb=grown(1000),
     params:
-        groundtruth=dump(
-            CONFIG.groundtruth,
+        estimation=dump(
+            CONFIG.estimation,
             include={"batch_frames", "assist_position_m", "assist_orientation_deg"},
         ),
-        truth_used=lambda w: truth_used(CONFIG.groundtruth, w.reconstructed).value,
-        estimation=lambda w: estimation_parameters(CONFIG, w.reconstructed),
+        truth_used=lambda w: truth_used(CONFIG.estimation, w.reconstructed).value,
+        parameters=lambda w: estimation_parameters(CONFIG, w.reconstructed),
     script:
         "../scripts/run_chain.py"

@@ -8,7 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from baselines.config.labels import GroundTruthConfig
+from baselines.config.labels import EstimationConfig
 from baselines.labels.batches import (
     BatchTrajectory,
     batches_of,
@@ -36,7 +36,7 @@ from tests.support.property_support import (
     table_of,
 )
 
-CFG = GroundTruthConfig(batch_frames=4)
+CFG = EstimationConfig(batch_frames=4)
 
 
 def batch_estimates(walk, batches, rng, noise_m):
