@@ -20,7 +20,7 @@ export PYTHONHASHSEED := 0
 # nothing of that is kept, and every job compiles a thousand modules again, half of its start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help reproduce smoke real start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock compile clean
+.PHONY: help reproduce smoke real start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock wheels compile clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -111,6 +111,11 @@ lock: $(INSTALLED)  ## write the versions installed now to the lock files
 	mv requirements.lock.new requirements.lock
 	setup/lock_cuda.sh $(BIN)/python > requirements-cuda.lock.new
 	mv requirements-cuda.lock.new requirements-cuda.lock
+
+wheels: $(INSTALLED)  ## sdists and wheels of the three distributions (build/dist)
+	rm -rf build/dist
+	for folder in . baselines reproduction; do \
+	  $(BIN)/python -m build --no-isolation --outdir build/dist $$folder || exit 1; done
 
 compile: $(INSTALLED)  ## compile all installed modules, for images that keep nothing compiled later
 	@# Some packages have modules that this Python cannot read and nobody imports.

@@ -79,8 +79,12 @@ def git_commit(folder: Path) -> str:
     """Return the commit checked out around ``folder``, with ``-dirty`` if tracked files changed.
 
     Changed results do not count: publishing one run must not mark the next one.
-    ``unknown`` outside a repository and without git: an installed package has no commit.
+    ``unknown`` without git, and where no repository tracks the folder: an installed package has no
+    commit, though its environment may stand in somebody's repository.
     """
+    tracked = _git(folder, "ls-files")
+    if tracked is None or tracked.returncode or not tracked.stdout:
+        return UNKNOWN
     commit = _git(folder, "rev-parse", "HEAD")
     if commit is None or commit.returncode:
         return UNKNOWN

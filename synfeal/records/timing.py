@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import resource
+import math
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -19,7 +20,17 @@ def timed(facts: Facts, name: str) -> Iterator[None]:
     begin = time.process_time()
     yield
     facts[name] = time.process_time() - begin
-    facts["peak_memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    facts["peak_memory_mb"] = peak_memory_mb()
+
+
+def peak_memory_mb() -> float:
+    """Return the most memory that this process has held so far; NaN on Windows."""
+    if sys.platform == "win32":
+        return math.nan
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1024**2 if sys.platform == "darwin" else 1024)
 
 
 def seconds_of(works: Iterable[Callable[[], object]], of_processor: bool = False) -> list[float]:

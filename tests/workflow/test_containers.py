@@ -39,10 +39,12 @@ def test_every_dependency_is_locked_within_its_range():
     slurm = pins("requirements-slurm.lock")
     assert not slurm.keys() & locked.keys()
     further = project["optional-dependencies"]
-    paper = tomllib.loads(read("reproduction/pyproject.toml"))["project"]
-    needed = [*project["dependencies"], *further["dev"], *paper["dependencies"]]
-    needed += paper["optional-dependencies"]["slurm"]
-    for text in (each for each in needed if not each.startswith("synfeal")):
+    needed = [*project["dependencies"], *further["dev"]]
+    for name in ("baselines", "reproduction"):
+        above = tomllib.loads(read(f"{name}/pyproject.toml"))
+        needed += above["tool"]["hatch"]["metadata"]["hooks"]["custom"]["dependencies"]
+        needed += above["project"].get("optional-dependencies", {}).get("slurm", [])
+    for text in needed:
         requirement = Requirement(text)
         version = (locked | slurm)[canonicalize_name(requirement.name)]
         assert requirement.specifier.contains(version, prereleases=True), requirement
