@@ -24,8 +24,8 @@ from tqdm import tqdm
 from benchmarks.measures import MEASURES, open_measure
 from benchmarks.rows import read_rows
 from reproduction.config.load import load_config
-from synfeal.config.collection import Strict
 from synfeal.config.load import describe, merge, read_yaml
+from synfeal.config.types import Strict
 from synfeal.errors import InputError
 from synfeal.records.tables import write_frame
 

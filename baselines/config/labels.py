@@ -6,14 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from synfeal.config.collection import (
-    Count,
-    Fraction,
-    Positive,
-    Slug,
-    Strict,
-    part,
-)
+from synfeal.config.types import Count, Fraction, Positive, Slug, Strict, part
 
 
 class SfmConfig(Strict):

@@ -11,17 +11,9 @@ from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError, mo
 
 from baselines.registry.declarations import declared
 from baselines.registry.kinds import LocalizerKind
-from synfeal.config.collection import (
-    Count,
-    Finite,
-    Fraction,
-    NonNegative,
-    Positive,
-    Strict,
-    part,
-)
 from synfeal.config.load import describe
 from synfeal.config.photometric import PhotometricConfig
+from synfeal.config.types import Count, Finite, Fraction, NonNegative, Positive, Strict, part
 
 InceptionName = Literal["googlenet", "inception_v3"]
 # Of the backbones that come with the package.

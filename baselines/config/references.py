@@ -7,7 +7,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from baselines.registry.kinds import Group
-from synfeal.config.collection import Count, Positive, Slug, Strict, part
+from synfeal.config.types import Count, Positive, Slug, Strict, part
 
 
 class ExternalConfig(Strict):

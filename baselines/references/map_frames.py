@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.camera.projection import pixels_of_normalised
-from synfeal.config.collection import Positive, Strict
 from synfeal.config.dataset import CameraConfig
+from synfeal.config.types import Positive, Strict
 from synfeal.dataset.finish import MANIFEST
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence

@@ -29,9 +29,9 @@ from baselines.references.descriptors import CHUNK, Vlad
 from baselines.references.features import Features
 from baselines.references.map_frames import MapFrames, MeshFile
 from synfeal.camera.projection import normalised_of_pixels
-from synfeal.config.collection import Strict
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
+from synfeal.config.types import Strict
 from synfeal.dataset.packed import fit_frame
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_sequence import Progress

@@ -24,8 +24,8 @@ from baselines.localizers.saved import checked_state, load_saved
 from baselines.training.data import ImageStatistics
 from baselines.training.resume import serialised
 from baselines.training.typicality import Calibration
-from synfeal.config.collection import Count, Finite, Positive, Strict
 from synfeal.config.load import describe
+from synfeal.config.types import Count, Finite, Positive, Strict
 from synfeal.errors import InputError, why
 from synfeal.records.files import atomic_path, read_json
 

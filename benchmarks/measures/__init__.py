@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pkgutil import resolve_name
 from typing import Any, NamedTuple, get_type_hints
 
-from synfeal.config.collection import Strict
+from synfeal.config.types import Strict
 
 # Place of the function, ``module:name``, that measures a case, whose type its annotation is.
 MEASURES = {

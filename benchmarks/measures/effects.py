@@ -7,9 +7,9 @@ from pathlib import Path
 from pydantic import Field
 
 from reproduction.speed.collection import seconds_of_effects
-from synfeal.config.collection import Strict
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import CLEAN, EffectsConfig
+from synfeal.config.types import Strict
 from synfeal.dataset.pose_table import read_frames
 
 

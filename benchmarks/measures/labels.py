@@ -16,8 +16,8 @@ from baselines.labels.kinect_fusion import kinect_fusion_batch
 from baselines.labels.posegraph.levenberg_marquardt import optimise_lm
 from baselines.labels.rgbd import rgbd_graph
 from baselines.labels.sfm import sfm_batch
-from synfeal.config.collection import Strict
 from synfeal.config.dataset import CameraConfig
+from synfeal.config.types import Strict
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, relative

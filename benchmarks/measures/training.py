@@ -19,7 +19,7 @@ from baselines.training.fit import PROTOCOLS, Protocol
 from baselines.training.predict import BATCH, predict_ms, predict_poses
 from baselines.training.run import Job, train_localizer
 from reproduction.config.tables import RepeatedTraining
-from synfeal.config.collection import Strict
+from synfeal.config.types import Strict
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.evaluation.metrics import pose_errors

@@ -18,14 +18,9 @@ from baselines.config.learning import (
 )
 from baselines.config.references import ReferencesConfig
 from reproduction.config.tables import RepeatedTraining, TableName
-from synfeal.config.collection import (
-    Count,
-    Slug,
-    Strict,
-    part,
-)
 from synfeal.config.dataset import CameraConfig, DatasetConfig
 from synfeal.config.effects import RobustnessConfig
+from synfeal.config.types import Count, Slug, Strict, part
 
 # An image costs the network of scene coordinates as much as so many cost a localizer: where
 # localizers of the published `night` were shown 30,000 images and scene coordinates 2,000, their

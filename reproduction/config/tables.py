@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from pydantic import Field, ValidationInfo, field_validator
 
 from baselines.config.learning import ModelName, TrainingConfig
-from synfeal.config.collection import Count
+from synfeal.config.types import Count
 
 TableName = Literal[
     "table2_ground_truth",

@@ -14,8 +14,8 @@ from baselines.config.learning import MODELS, ModelName
 from baselines.labels.injected import LABEL_ERRORS, moved_m
 from reproduction.config.profile import Config
 from reproduction.config.tables import DEFAULT, KEYS, Repetitions, TableName
-from synfeal.config.collection import NonNegative, Strict
 from synfeal.config.load import describe
+from synfeal.config.types import NonNegative, Strict
 from synfeal.errors import InputError
 from synfeal.records.provenance import seed_of
 from synfeal.records.tables import read_records

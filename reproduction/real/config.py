@@ -9,8 +9,8 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError
 
 from baselines.config.learning import MODELS, ModelName
-from synfeal.config.collection import Count, Strict, part
 from synfeal.config.load import describe
+from synfeal.config.types import Count, Strict, part
 from synfeal.errors import InputError
 
 Direction = Literal["official", "forward", "reverse", "alternate"]

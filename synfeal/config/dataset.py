@@ -13,19 +13,9 @@ from pydantic import Field, model_validator
 from synfeal.camera.calibration import read_calibration
 from synfeal.camera.fisheye import EQUIDISTANT, largest_angle_rad, radius_of_angle
 from synfeal.camera.projection import Intrinsics, Projection, refuse_fold
-from synfeal.config.collection import (
-    Channel,
-    CollectionConfig,
-    Count,
-    Finite,
-    Positive,
-    SceneConfig,
-    Seed,
-    Slug,
-    Strict,
-    part,
-)
+from synfeal.config.collection import CollectionConfig, SceneConfig
 from synfeal.config.effects import EffectsConfig, refuse_long_exposure
+from synfeal.config.types import Channel, Count, Finite, Positive, Seed, Slug, Strict, part
 from synfeal.errors import InputError
 
 

@@ -7,17 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from synfeal.config.collection import (
-    CollectionConfig,
-    Count,
-    NonNegative,
-    Positive,
-    Seed,
-    SizeName,
-    Slug,
-    Strict,
-    part,
-)
+from synfeal.config.collection import CollectionConfig
+from synfeal.config.types import Count, NonNegative, Positive, Seed, SizeName, Slug, Strict, part
 
 Kelvin = Annotated[float, Field(ge=2000, le=25000)]
 MOST_PATH_OBJECTS = 100

@@ -13,8 +13,8 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-from synfeal.config.collection import Strict
 from synfeal.config.effects import NoiseConfig, Stops
+from synfeal.config.types import Strict
 
 Share = Annotated[float, Field(ge=0, le=1)]
 
