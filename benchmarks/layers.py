@@ -34,9 +34,9 @@ from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.instances import number_instances
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
-from synfeal.pairs.correspondence import TOLERANCE, DepthImage, State, points_of_pixels
-from synfeal.pairs.flow import flow_between
-from synfeal.pairs.overlap import GRID, grid_points, overlaps_with
+from synfeal.pairing.correspondence import TOLERANCE, DepthImage, State, points_of_pixels
+from synfeal.pairing.flow import flow_between
+from synfeal.pairing.overlap import GRID, grid_points, overlaps_with
 from synfeal.records.tables import write_frame
 from synfeal.render import open_renderer
 from synfeal.render.surface import SurfaceTable

@@ -21,10 +21,10 @@ from torch.utils.data import DataLoader, Dataset
 
 from synfeal.dataset.frame_files import read_image
 from synfeal.dataset.sequence_listing import COLOR
-from synfeal.pairs.correspondence import State
-from synfeal.pairs.flow import flow_between
-from synfeal.pairs.frames import DepthFrames, read_depth_frames
-from synfeal.pairs.run import read_pairs
+from synfeal.pairing.correspondence import State
+from synfeal.pairing.flow import flow_between
+from synfeal.pairing.frames import DepthFrames, read_depth_frames
+from synfeal.pairing.run import read_pairs
 
 
 class Pair(TypedDict):

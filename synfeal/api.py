@@ -270,12 +270,12 @@ def find_pairs(path: AnyPath, out: AnyPath, **settings: Any) -> pd.DataFrame:
     Args:
         path: Data set with depth.
         out: Directory to create.
-        settings: Fields of :class:`synfeal.pairs.run.PairsJob` and of
-            :class:`synfeal.pairs.choose.Choice`: ``among``, ``per_frame`` and so on.
+        settings: Fields of :class:`synfeal.pairing.run.PairsJob` and of
+            :class:`synfeal.pairing.choose.Choice`: ``among``, ``per_frame`` and so on.
     """
-    from synfeal.pairs.choose import Choice
-    from synfeal.pairs.run import PairsJob
-    from synfeal.pairs.run import find_pairs as find
+    from synfeal.pairing.choose import Choice
+    from synfeal.pairing.run import PairsJob
+    from synfeal.pairing.run import find_pairs as find
 
     bounds = {f.name: settings.pop(f.name) for f in fields(Choice) if f.name in settings}
     return find(PairsJob(Path(path), Path(out), choice=Choice(**bounds), **settings)).table

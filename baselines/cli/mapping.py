@@ -14,7 +14,7 @@ from synfeal.errors import InputError
 
 if TYPE_CHECKING:
     from baselines.references.localized import LocalizedInMap
-    from synfeal.scan.camera import CameraOptions
+    from synfeal.scanning.camera import CameraOptions
 
 
 # Beyond, a focal length is not that of the camera: tolerances of lenses are a third of it.
@@ -70,7 +70,7 @@ def map(arguments: argparse.Namespace) -> None:  # noqa: A001 (the name of the c
 
 def camera_options(arguments: argparse.Namespace) -> CameraOptions:
     """Read the options of colour and depth camera, :data:`RGBD_OPTIONS`."""
-    from synfeal.scan.camera import CameraOptions
+    from synfeal.scanning.camera import CameraOptions
 
     aside = arguments.depth_from_color
     return CameraOptions(

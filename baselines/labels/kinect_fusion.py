@@ -28,7 +28,7 @@ from baselines.registry.kinds import LabelMethod
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.geometry.poses import inverse
-from synfeal.scan.fusion import fuse_depth
+from synfeal.scanning.fusion import fuse_depth
 
 Array = NDArray[np.float64]
 Depth = NDArray[np.float32]

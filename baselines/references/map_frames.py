@@ -19,8 +19,8 @@ from synfeal.dataset.world import read_sequence_from_world
 from synfeal.errors import InputError
 from synfeal.mesh.load import UpAxis
 from synfeal.records.files import read_json
-from synfeal.scan.camera import CameraOptions, RgbdCamera, rgbd_camera
-from synfeal.scan.reading import Depth, image_size, read_color, read_depth_m
+from synfeal.scanning.camera import CameraOptions, RgbdCamera, rgbd_camera
+from synfeal.scanning.reading import Depth, image_size, read_color, read_depth_m
 
 Array = NDArray[np.float64]
 

@@ -43,7 +43,7 @@ from synfeal.planning.like import resized
 from synfeal.records.files import atomic_directory, read_json, write_json, write_text
 from synfeal.records.tables import write_numbers
 from synfeal.render.choose import open_renderer
-from synfeal.scan.picture import compare, write_picture
+from synfeal.scanning.picture import compare, write_picture
 from synfeal.validation.camera import camera_of_dataset
 
 Array = NDArray[np.float64]

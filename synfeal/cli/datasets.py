@@ -93,7 +93,7 @@ def validate(arguments: argparse.Namespace) -> None:
 )
 def export(arguments: argparse.Namespace) -> None:
     """Write a 7-Scenes data set in the format of another program."""
-    from synfeal.export.run import export as write
+    from synfeal.exporting.run import export as write
 
     out: Path = arguments.out
     n_frames = write(arguments.dataset, arguments.to, out, arguments.copy, arguments.camera)
@@ -137,8 +137,8 @@ def pairs(arguments: argparse.Namespace) -> None:
 
     Writes a table of overlaps, and optical flow if asked for.
     """
-    from synfeal.pairs.choose import Choice
-    from synfeal.pairs.run import PairsJob, find_pairs
+    from synfeal.pairing.choose import Choice
+    from synfeal.pairing.run import PairsJob, find_pairs
 
     dataset: Path = arguments.dataset
     job = PairsJob(

@@ -15,7 +15,7 @@ from synfeal.config.options import KEYS, dataset_config, options_named, scene_co
 from synfeal.errors import InputError
 from synfeal.records.files import read_json
 
-# Of synfeal.scan.camera, which --help need not load.
+# Of synfeal.scanning.camera, which --help need not load.
 PRESETS = ("7scenes", "tum-fr1", "tum-fr2", "tum-fr3")
 DIRECTIONS = ("world_from_cam", "cam_from_world")
 MARGIN_M, MARGIN_DEG = 0.2, 10.0  # of --like
@@ -303,7 +303,7 @@ def inspect(arguments: argparse.Namespace) -> None:
 
     Writes numbers, a picture and an offline 3D page, and prints the command to collect a data set.
     """
-    from synfeal.inspect.run import inspect_mesh
+    from synfeal.inspection.run import inspect_mesh
 
     out = arguments.out or Path(f"{arguments.mesh.stem}-inspect")
     scene = scene_config(options_among(arguments, KEYS))
@@ -363,9 +363,9 @@ def scan(arguments: argparse.Namespace) -> None:
     """
     if arguments.gravity and arguments.keep_axes:
         raise InputError("--keep-axes: contradicts --gravity; leave one of the two out")
-    from synfeal.scan.camera import CameraOptions
-    from synfeal.scan.run import ScanJob
-    from synfeal.scan.run import scan as make_scan
+    from synfeal.scanning.camera import CameraOptions
+    from synfeal.scanning.run import ScanJob
+    from synfeal.scanning.run import scan as make_scan
 
     start, stop = arguments.frames or (0, None)
     offset = arguments.depth_from_color

@@ -21,7 +21,7 @@ from synfeal.dataset.preview import write_preview
 from synfeal.dataset.sevenscenes import read_split
 from synfeal.errors import InputError
 from synfeal.evaluation.run import Settings, evaluate
-from synfeal.export.run import export
+from synfeal.exporting.run import export
 from synfeal.planning.repeat import read_poses
 from synfeal.validation.run import validate
 from tests.support import named_frames as numbered

@@ -196,6 +196,6 @@ def loaded_by(code, among):
 
 def test_nothing_is_loaded_early_and_collecting_needs_no_networks():
     assert not loaded_by("import synfeal", {"numpy", "pydantic", "scipy", "torch", "trimesh"})
-    names = ("api", "inspect.run", "validation.run", "export.run", "evaluation.run")
+    names = ("api", "inspection.run", "validation.run", "exporting.run", "evaluation.run")
     code = "\n".join(f"import synfeal.{name}" for name in names)
     assert not loaded_by(code, {"baselines", "cv2", "gtsam", "open3d", "snakemake", "torch"})

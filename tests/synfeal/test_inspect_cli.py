@@ -13,7 +13,7 @@ from PIL import Image
 
 from synfeal.cli import main
 from synfeal.config.collection import SceneConfig
-from synfeal.inspect.run import top_view
+from synfeal.inspection.run import top_view
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from tests.support.collected import painted

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from synfeal.inspect.surface import SurfacePoints, split_longest_edges, viewer_mesh
-from synfeal.inspect.text import page_html
+from synfeal.inspection.surface import SurfacePoints, split_longest_edges, viewer_mesh
+from synfeal.inspection.text import page_html
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from tests.support.collected import painted
 

@@ -10,23 +10,23 @@ import trimesh
 
 from synfeal.config.options import scene_config
 from synfeal.errors import InputError
-from synfeal.inspect.boxes import (
+from synfeal.inspection.boxes import (
     UNWANTED_WEIGHT,
     largest_box,
     share_inside,
     suggest_box,
     suggest_boxes,
 )
-from synfeal.inspect.doubts import color_doubts, doubts_of, floor_areas_m2, load_as_meant
-from synfeal.inspect.facts import detail_of, texels_per_m
-from synfeal.inspect.freespace import (
+from synfeal.inspection.doubts import color_doubts, doubts_of, floor_areas_m2, load_as_meant
+from synfeal.inspection.facts import detail_of, texels_per_m
+from synfeal.inspection.freespace import (
     FreeSpace,
     find_free_space,
     find_free_spaces,
     survey,
     viewpoint,
 )
-from synfeal.inspect.surface import SurfacePoints, nearest_texels
+from synfeal.inspection.surface import SurfacePoints, nearest_texels
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, simplify

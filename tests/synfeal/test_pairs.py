@@ -14,12 +14,12 @@ from synfeal.dataset.sevenscenes import Sequence, pose_text, write_splits
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
-from synfeal.pairs import overlap
-from synfeal.pairs.choose import Choice
-from synfeal.pairs.correspondence import DepthImage, State
-from synfeal.pairs.flow import Flow, flow_between, read_flows, write_flows
-from synfeal.pairs.overlap import grid_points, overlaps_with
-from synfeal.pairs.run import read_pairs
+from synfeal.pairing import overlap
+from synfeal.pairing.choose import Choice
+from synfeal.pairing.correspondence import DepthImage, State
+from synfeal.pairing.flow import Flow, flow_between, read_flows, write_flows
+from synfeal.pairing.overlap import grid_points, overlaps_with
+from synfeal.pairing.run import read_pairs
 from synfeal.records.files import write_json
 from tests.support.brute_rays import Truth, first_hits
 from tests.support.collected import collect, refused, save_room

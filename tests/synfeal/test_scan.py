@@ -20,9 +20,9 @@ from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.load import load_mesh
-from synfeal.scan.cleaning import without_small_pieces
-from synfeal.scan.fusion import FusedSurface
-from synfeal.scan.gravity import find_gravity
+from synfeal.scanning.cleaning import without_small_pieces
+from synfeal.scanning.fusion import FusedSurface
+from synfeal.scanning.gravity import find_gravity
 from tests.support.scan_sequence import (
     COLOR_PX,
     DEPTH_PX,

@@ -18,7 +18,7 @@ from synfeal.dataset.preview import TILE_WIDTH_PX
 from synfeal.dataset.render_sequence import write_sequence
 from synfeal.effects.scene import SceneRenderer
 from synfeal.errors import InputError
-from synfeal.export.run import export
+from synfeal.exporting.run import export
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.model import TexturedMesh

@@ -13,7 +13,7 @@ import synfeal
 from synfeal.camera.projection import rays_of_pixels
 from synfeal.cli import main
 from synfeal.config.dataset import CameraConfig
-from synfeal.export.run import export
+from synfeal.exporting.run import export
 from synfeal.geometry.poses import umeyama_sim3
 from synfeal.geometry.rotations import quat_wxyz_from_matrix, rotation_angle_rad
 from synfeal.mesh.save import save_glb

@@ -50,7 +50,7 @@ from reproduction.tables import (
 from reproduction.tables.cells import key_of, published_cells, read_cells
 from reproduction.tables.layouts import BLOCKS, SOURCES, scene_title
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
-from synfeal.inspect.surface import SurfacePoints, viewer_js, viewer_mesh
+from synfeal.inspection.surface import SurfacePoints, viewer_js, viewer_mesh
 from synfeal.mesh.load import load_mesh
 from synfeal.records.files import write_text
 from synfeal.records.provenance import generator_of

@@ -3,7 +3,7 @@
 ``flow_px[row, column]`` is the way, in pixels, from the centre of a pixel of frame a to where frame
 b shows, or would show, the point: x right, y down. It is finite wherever frame a has depth and the
 camera of b can show the point, visible or not, inside the image or not; NaN elsewhere. ``state`` is
-:class:`synfeal.pairs.correspondence.State` of each pixel.
+:class:`synfeal.pairing.correspondence.State` of each pixel.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from synfeal.camera.projection import cell_pixels, pixel_offset
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import read_as
-from synfeal.pairs.correspondence import (
+from synfeal.pairing.correspondence import (
     TOLERANCE,
     Array,
     DepthImage,
@@ -34,7 +34,7 @@ class Flow(NamedTuple):
 
     Attributes:
         flow_px: (H, W, 2) float32, x and y; NaN where there is none.
-        state: (H, W) uint8, a :class:`~synfeal.pairs.correspondence.State`.
+        state: (H, W) uint8, a :class:`~synfeal.pairing.correspondence.State`.
     """
 
     flow_px: NDArray[np.float32]

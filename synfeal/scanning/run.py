@@ -20,16 +20,16 @@ from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.records.files import write_json
-from synfeal.scan.agreement import DepthAgreement, check_depth
-from synfeal.scan.camera import CameraOptions, RgbdCamera, intrinsics_record, rgbd_camera
-from synfeal.scan.cleaning import without_small_pieces
-from synfeal.scan.coloring import colors_of
-from synfeal.scan.consistency import N_FRAMES as FIT_FRAMES
-from synfeal.scan.consistency import ColorFit, fit_color, sightings_of, spread, with_color
-from synfeal.scan.fusion import FusedSurface, fuse
-from synfeal.scan.gravity import Gravity, find_gravity, upright_world
-from synfeal.scan.picture import Comparison, compare, write_picture
-from synfeal.scan.reading import image_size
+from synfeal.scanning.agreement import DepthAgreement, check_depth
+from synfeal.scanning.camera import CameraOptions, RgbdCamera, intrinsics_record, rgbd_camera
+from synfeal.scanning.cleaning import without_small_pieces
+from synfeal.scanning.coloring import colors_of
+from synfeal.scanning.consistency import N_FRAMES as FIT_FRAMES
+from synfeal.scanning.consistency import ColorFit, fit_color, sightings_of, spread, with_color
+from synfeal.scanning.fusion import FusedSurface, fuse
+from synfeal.scanning.gravity import Gravity, find_gravity, upright_world
+from synfeal.scanning.picture import Comparison, compare, write_picture
+from synfeal.scanning.reading import image_size
 
 Array = NDArray[np.float64]
 COMPARED = 24  # photographs that the scan is compared with

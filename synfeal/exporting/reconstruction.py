@@ -30,7 +30,7 @@ from synfeal.camera.fisheye import EQUIDISTANT
 from synfeal.camera.projection import cell_directions
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.sevenscenes import SPLIT_FILES
-from synfeal.export.frames import (
+from synfeal.exporting.frames import (
     RIGHT,
     ExportFrame,
     ExportSet,

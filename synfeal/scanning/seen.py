@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from synfeal.camera.distortion import distort
 from synfeal.config.dataset import CameraConfig
 from synfeal.geometry.poses import inverse
-from synfeal.scan.reading import Depth
+from synfeal.scanning.reading import Depth
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

@@ -19,10 +19,10 @@ from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig
 from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
-from synfeal.inspect.doubts import Inspection
-from synfeal.inspect.facts import facts_of
-from synfeal.inspect.surface import ACROSS_RAD, viewer_mesh
-from synfeal.inspect.text import Facts, how_to_go_on, page_html, plain_text, sections_of
+from synfeal.inspection.doubts import Inspection
+from synfeal.inspection.facts import facts_of
+from synfeal.inspection.surface import ACROSS_RAD, viewer_mesh
+from synfeal.inspection.text import Facts, how_to_go_on, page_html, plain_text, sections_of
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
 from synfeal.records.files import atomic_path, refuse_foreign, write_json

@@ -32,7 +32,7 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.sequence_listing import DEPTH
 from synfeal.dataset.sevenscenes import pose_text
 from synfeal.errors import InputError
-from synfeal.export.frames import (
+from synfeal.exporting.frames import (
     ExportFrame,
     ExportSet,
     Place,

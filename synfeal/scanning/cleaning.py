@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from synfeal.scan.fusion import FusedSurface
+from synfeal.scanning.fusion import FusedSurface
 
 
 def without_small_pieces(surface: FusedSurface, min_area_m2: float) -> tuple[FusedSurface, int]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.inspect.freespace import CAMERA_HEIGHT_M, FreeSpace, step_m_of
+from synfeal.inspection.freespace import CAMERA_HEIGHT_M, FreeSpace, step_m_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

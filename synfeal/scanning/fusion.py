@@ -2,7 +2,7 @@
 
 A truncated signed distance field on Open3D's hashed grid of voxel blocks (Dong et al., "ASH: A
 Modern Framework for Parallel Spatial Hashing in 3D Perception", PAMI 2022), and marching cubes.
-Colours are no part of it: :mod:`synfeal.scan.coloring` looks them up in the photographs, where
+Colours are no part of it: :mod:`synfeal.scanning.coloring` looks them up in the photographs, where
 every lens and every offset between the cameras can be told exactly.
 """
 
@@ -20,8 +20,8 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
-from synfeal.scan.camera import RgbdCamera
-from synfeal.scan.reading import Depth, read_depth_m
+from synfeal.scanning.camera import RgbdCamera
+from synfeal.scanning.reading import Depth, read_depth_m
 
 Array = NDArray[np.float64]
 # Voxels per edge of a block, blocks to begin with (more are added), truncation in voxels, and how

@@ -1,8 +1,8 @@
 """Overlaps of all frames with all others.
 
 The overlap of frame a with frame b is the share of those of a's pixels with depth whose points are
-visible in b (:mod:`synfeal.pairs.correspondence`). It is counted over the middles of equal cells of
-a's image: with the 32 x 24 of the default, an overlap of 50 % is known to about 2 %.
+visible in b (:mod:`synfeal.pairing.correspondence`). It is counted over the middles of equal cells
+of a's image: with the 32 x 24 of the default, an overlap of 50 % is known to about 2 %.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from synfeal.camera.projection import cell_pixels
 from synfeal.config.dataset import CameraConfig
-from synfeal.pairs.correspondence import DepthImage, State, look_for, points_of_pixels
+from synfeal.pairing.correspondence import DepthImage, State, look_for, points_of_pixels
 
 Array = NDArray[np.float64]
 ReadDepth = Callable[[int], NDArray[np.float32]]

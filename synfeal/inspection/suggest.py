@@ -20,8 +20,8 @@ from synfeal.config.options import SCENE, TEST_PATHS
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.sevenscenes import Split
 from synfeal.errors import InputError
-from synfeal.inspect.boxes import share_inside, suggest_boxes
-from synfeal.inspect.freespace import SLACK, FreeSpace, Survey, find_free_spaces, together
+from synfeal.inspection.boxes import share_inside, suggest_boxes
+from synfeal.inspection.freespace import SLACK, FreeSpace, Survey, find_free_spaces, together
 from synfeal.mesh.ambient import with_ambient_light
 from synfeal.mesh.clearance import Clearance
 from synfeal.mesh.model import TexturedMesh

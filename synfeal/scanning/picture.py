@@ -15,8 +15,8 @@ from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.mesh.model import TexturedMesh
 from synfeal.records.files import atomic_path
 from synfeal.render.choose import open_renderer
-from synfeal.scan.consistency import LUMA, shrunk
-from synfeal.scan.reading import read_color
+from synfeal.scanning.consistency import LUMA, shrunk
+from synfeal.scanning.reading import read_color
 
 Rgb = NDArray[np.uint8]
 SHRINK = 2

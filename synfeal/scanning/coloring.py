@@ -17,10 +17,10 @@ from scipy.spatial import cKDTree
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
-from synfeal.scan.camera import RgbdCamera
-from synfeal.scan.fusion import FusedSurface
-from synfeal.scan.reading import read_color, read_depth_m
-from synfeal.scan.seen import project, sampled, seen_points, within
+from synfeal.scanning.camera import RgbdCamera
+from synfeal.scanning.fusion import FusedSurface
+from synfeal.scanning.reading import read_color, read_depth_m
+from synfeal.scanning.seen import project, sampled, seen_points, within
 
 MARGIN_PX = 2.0
 NEIGHBOURS = 4  # coloured vertices whose mean an uncoloured one takes

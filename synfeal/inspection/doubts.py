@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.collection import SceneConfig
-from synfeal.inspect.freespace import FreeSpace, survey, viewpoint
-from synfeal.inspect.suggest import MAX_OF_ONE_COLOR, MAX_PLAIN, Suggestion, suggest
-from synfeal.inspect.surface import SurfacePoints, area_by_color, triangle_areas_m2
+from synfeal.inspection.freespace import FreeSpace, survey, viewpoint
+from synfeal.inspection.suggest import MAX_OF_ONE_COLOR, MAX_PLAIN, Suggestion, suggest
+from synfeal.inspection.surface import SurfacePoints, area_by_color, triangle_areas_m2
 from synfeal.mesh.checks import shows_one_color
 from synfeal.mesh.load import is_y_up, load_mesh
 from synfeal.mesh.model import TexturedMesh
@@ -246,7 +246,7 @@ class Inspection:
 
     @classmethod
     def of(cls, scene: SceneConfig, unit_is_given: bool) -> Self:
-        """Load and look at a mesh; see :func:`synfeal.inspect.run.inspect_mesh`."""
+        """Load and look at a mesh; see :func:`synfeal.inspection.run.inspect_mesh`."""
         scene, mesh, assumed = load_as_meant(scene, unit_is_given)
         box_m = sampling_box_of(scene, mesh.bounds_m, str(scene.path))
         surface = SurfacePoints.of(mesh, generator_of(0, "inspect"))

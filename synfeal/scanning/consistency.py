@@ -24,10 +24,10 @@ from synfeal.camera.projection import Intrinsics
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.geometry.poses import inverse
-from synfeal.scan.camera import RgbdCamera
-from synfeal.scan.fusion import FusedSurface
-from synfeal.scan.reading import read_color, read_depth_m
-from synfeal.scan.seen import Floats, project, sampled, seen_points, within
+from synfeal.scanning.camera import RgbdCamera
+from synfeal.scanning.fusion import FusedSurface
+from synfeal.scanning.reading import read_color, read_depth_m
+from synfeal.scanning.seen import Floats, project, sampled, seen_points, within
 
 N_POINTS, N_FRAMES = 40_000, 60
 SHRINK = 2  # sides of photographs: averages noise and compression, and widens the valley

@@ -21,9 +21,9 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
-from synfeal.scan.camera import RgbdCamera
-from synfeal.scan.consistency import spread
-from synfeal.scan.reading import Depth, read_depth_m
+from synfeal.scanning.camera import RgbdCamera
+from synfeal.scanning.consistency import spread
+from synfeal.scanning.reading import Depth, read_depth_m
 
 Array = NDArray[np.float64]
 N_FRAMES, N_POINTS = 24, 300  # frames that are compared, each with each, and points of each

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from trimesh.triangles import cross
 
 import synfeal
-from synfeal.inspect.doubts import (
+from synfeal.inspection.doubts import (
     Inspection,
     color_doubts,
     doubts_of,
     floor_areas_m2,
     suggestion_doubts,
 )
-from synfeal.inspect.freespace import DEFINITION, FreeSpace
-from synfeal.inspect.suggest import COUNTS
-from synfeal.inspect.surface import area_by_color, color_of, triangle_areas_m2
+from synfeal.inspection.freespace import DEFINITION, FreeSpace
+from synfeal.inspection.suggest import COUNTS
+from synfeal.inspection.surface import area_by_color, color_of, triangle_areas_m2
 from synfeal.mesh.gltf import slug_of, title_of
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.properties import mesh_properties, mesh_topology

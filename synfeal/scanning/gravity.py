@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_matrix
-from synfeal.scan.fusion import FusedSurface
+from synfeal.scanning.fusion import FusedSurface
 
 Array = NDArray[np.float64]
 SAMPLES = 30_000

@@ -11,7 +11,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
-from synfeal.inspect.surface import viewer_js
+from synfeal.inspection.surface import viewer_js
 from synfeal.mesh.gltf import slug_of
 
 Facts = Mapping[str, Any]
@@ -215,10 +215,10 @@ def page_html(
         doubts: Sentences to highlight at the top.
         sections: Titles and rows of the tables, from :func:`sections_of`.
         snippet: Lines for a configuration file and for a shell.
-        picture_png: Content of the picture, from :func:`synfeal.inspect.run.picture_png`.
-        scene: Argument of the viewer, from :meth:`synfeal.inspect.surface.ViewerMesh.scene`.
+        picture_png: Content of the picture, from :func:`synfeal.inspection.run.picture_png`.
+        scene: Argument of the viewer, from :meth:`synfeal.inspection.surface.ViewerMesh.scene`.
     """
-    loader = PackageLoader("synfeal.inspect", ".")
+    loader = PackageLoader("synfeal.inspection", ".")
     pages = Environment(loader=loader, autoescape=True, keep_trailing_newline=True)
     return pages.get_template("page.html").render(
         title=title,

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from synfeal.dataset.frame_files import FrameFile, link_or_unpack
-from synfeal.export.frames import ExportSet, Place, read_export_set
-from synfeal.export.learned import export_ace, export_mstransformer, export_nerfstudio
-from synfeal.export.reconstruction import export_colmap, export_hloc, export_tum
-from synfeal.export.rosbag import export_rosbag
+from synfeal.exporting.frames import ExportSet, Place, read_export_set
+from synfeal.exporting.learned import export_ace, export_mstransformer, export_nerfstudio
+from synfeal.exporting.reconstruction import export_colmap, export_hloc, export_tum
+from synfeal.exporting.rosbag import export_rosbag
 from synfeal.records.files import atomic_directory, refuse_existing, refuse_inside
 from synfeal.records.progress import Progress
 

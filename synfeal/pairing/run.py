@@ -13,11 +13,11 @@ from tqdm import tqdm
 
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
-from synfeal.pairs.choose import Choice
-from synfeal.pairs.correspondence import TOLERANCE, DepthImage, State
-from synfeal.pairs.flow import flow_between, write_flows
-from synfeal.pairs.frames import DepthFrames, read_depth_frames
-from synfeal.pairs.overlap import GRID, grid_points, overlaps_with
+from synfeal.pairing.choose import Choice
+from synfeal.pairing.correspondence import TOLERANCE, DepthImage, State
+from synfeal.pairing.flow import flow_between, write_flows
+from synfeal.pairing.frames import DepthFrames, read_depth_frames
+from synfeal.pairing.overlap import GRID, grid_points, overlaps_with
 from synfeal.records.files import (
     atomic_directory,
     refuse_existing,

@@ -21,7 +21,7 @@ import numpy as np
 
 from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
 from synfeal.errors import InputError
-from synfeal.export.frames import ExportFrame, ExportSet, Place, need_perspective
+from synfeal.exporting.frames import ExportFrame, ExportSet, Place, need_perspective
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.validation.listing import read_color, read_depth_mm
 

@@ -32,7 +32,7 @@ class RgbdCamera:
     the sequence is comparable with the photograph of that name. Where they were estimated from
     depth, as KinectFusion does, they are those of the depth camera in truth, 2.5 cm beside; the
     offset that matters, the angle between the two cameras, then shows as a principal point of the
-    colour camera that is a few pixels off, and :mod:`synfeal.scan.consistency` finds it.
+    colour camera that is a few pixels off, and :mod:`synfeal.scanning.consistency` finds it.
 
     Attributes:
         color: Intrinsics and lens of the photographs.

@@ -154,7 +154,7 @@ class ViewerMesh:
 
 def viewer_js() -> str:
     """Read the script that defines ``synfealViewer(canvas, scene)``."""
-    return files("synfeal.inspect").joinpath("viewer.js").read_text(encoding="utf-8")
+    return files("synfeal.inspection").joinpath("viewer.js").read_text(encoding="utf-8")
 
 
 def viewer_mesh(mesh: TexturedMesh, surface: SurfacePoints) -> ViewerMesh:
