@@ -1,0 +1,160 @@
+"""COLMAP models, text or binary, with their photographs and, if there are any, depth maps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from synfeal.camera.calibration import Calibration
+from synfeal.captures.capture import (
+    Capture,
+    CapturedFrame,
+    calibration,
+    partial_read,
+    resized,
+    rigid_pose,
+)
+from synfeal.captures.formats import CaptureFormat
+from synfeal.captures.images import depth_reader, read_photograph, size_of_image
+from synfeal.errors import InputError, read_as
+from synfeal.geometry.poses import inverse
+from synfeal.records.files import lies_in
+
+MODELS = ("", "sparse/0", "sparse", "colmap/sparse/0", "model")
+IMAGES = ("images", "rgb", "", "../images", "../../images")
+DEPTHS = ("depth", "depths", "stereo/depth_maps")
+MILLIMETRES = 1000.0
+
+
+def _model_of(path: Path) -> Path | None:
+    """Return the folder of the model in or below a path; None where there is none."""
+    for name in MODELS:
+        for end in (".bin", ".txt"):
+            if all((path / name / f"{kind}{end}").is_file() for kind in ("cameras", "images")):
+                return path / name
+    return None
+
+
+def _read(path: Path) -> Capture:
+    import pycolmap
+
+    folder = _model_of(path)
+    if folder is None:
+        raise InputError(f"{path}: holds no cameras and images, .bin or .txt, of a COLMAP model")
+    points = [folder / f"points3D{end}" for end in (".bin", ".txt")]
+    if not any(file.is_file() for file in points):
+        raise InputError(f"{points[0]}: missing; a model of COLMAP has it, if only an empty one")
+    with read_as(folder, "a model of COLMAP", OSError, ValueError, RuntimeError):
+        model = pycolmap.Reconstruction(folder)
+    registered = [model.images[i] for i in model.reg_image_ids()]
+    if not registered:
+        raise InputError(f"{folder}: none of its images has a pose")
+    names = _names(folder, registered)
+    root = _photographs_of(path, folder, list(names.values()))
+    cameras = {
+        number: _camera(camera, f"{folder}: camera {number}")
+        for number, camera in model.cameras.items()
+    }
+    frames, missing = [], []
+    for image in sorted(registered, key=lambda image: names[image.image_id]):
+        name = names[image.image_id]
+        photograph = root / name
+        if not lies_in(photograph, root):
+            raise InputError(f"{folder}: image '{name}' leads out of {root}")
+        if not photograph.is_file():
+            missing.append(name)
+            continue
+        frames.append(_frame(path, name, image, photograph, cameras[image.camera_id]))
+    notes = (f"{len(missing)} images are missing ({missing[0]}, ...)",) if missing else ()
+    return Capture(path, FORMAT.name, tuple(frames), notes=notes)
+
+
+def _names(folder: Path, images: list[Any]) -> dict[int, str]:
+    """Return the names of images by their numbers.
+
+    COLMAP's reader of text ends a name at its first blank; the rest of the line is the name.
+    """
+    names = {int(image.image_id): str(image.name) for image in images}
+    file = folder / "images.txt"
+    if (folder / "images.bin").is_file() or not file.is_file():
+        return names
+    with read_as(file, "a model of COLMAP"):
+        lines = file.read_text(encoding="utf-8").splitlines()
+    for line in lines:
+        cells = line.split(None, 9)
+        if len(cells) == 10 and cells[0].isdecimal():
+            number, name = int(cells[0]), cells[9].strip()
+            if name.startswith(names.get(number, "\0")):
+                names[number] = name
+    return names
+
+
+def _photographs_of(path: Path, folder: Path, names: list[str]) -> Path:
+    """Find the folder that the names of the images start in."""
+    for base in (path, folder):
+        for sub in IMAGES:
+            if any((base / sub / name).is_file() for name in names[:20]):
+                return base / sub
+    raise InputError(
+        f"{folder}: its images ({names[0]}, ...) are neither in {path / 'images'} nor in"
+        f" {path}; copy them to the first"
+    )
+
+
+def _camera(camera: Any, place: str) -> Calibration:
+    """Translate a camera; those of more coefficients than ours, and fisheyes of fewer, by name."""
+    model = camera.model.name
+    names = [name.strip() for name in camera.params_info.split(",")]
+    values: dict[str, float] = dict(zip(names, camera.params.tolist(), strict=True))
+    focal = values.get("f", 0.0)
+    pinhole = [values.get("fx", focal), values.get("fy", focal), values["cx"], values["cy"]]
+    radial = values.get("k", values.get("k1", 0.0))
+    if "FISHEYE" in model and "THIN" not in model:
+        k = (radial, *(values.get(name, 0.0) for name in ("k2", "k3", "k4")))
+        return calibration(
+            camera.width, camera.height, pinhole, place, projection="fisheye", fisheye_k=k
+        )
+    lens = (radial, *(values.get(name, 0.0) for name in ("k2", "p1", "p2", "k3")))
+    if any(values.get(name) for name in ("k4", "k5", "k6", "omega", "sx1", "sy1")):
+        raise InputError(f"{place}: a lens of {model} is not read; undistort the images first")
+    return calibration(camera.width, camera.height, pinhole, place, distortion=lens)
+
+
+def _frame(
+    path: Path, name: str, image: Any, photograph: Path, camera: Calibration
+) -> CapturedFrame:
+    size = size_of_image(photograph)
+    if size != (camera.width, camera.height):
+        camera = resized(camera, *size)
+    depth = _depth_of(path, name)
+    pose = rigid_pose(image.cam_from_world().matrix(), f"image '{name}'")
+    return CapturedFrame(
+        name=name,
+        read_color=partial_read(read_photograph, photograph, *size),
+        camera=camera,
+        world_from_cam=np.asarray(inverse(pose)),
+        read_depth_m=depth_reader(depth, MILLIMETRES),
+        depth_camera=resized(camera, *size_of_image(depth)) if depth else None,
+        color_file=photograph,
+    )
+
+
+def _depth_of(path: Path, name: str) -> Path | None:
+    """Return the depth image of a photograph, of the same name but for its ending."""
+    for folder in DEPTHS:
+        file = (path / folder / name).with_suffix(".png")
+        if file.is_file():
+            return file
+    return None
+
+
+FORMAT = CaptureFormat(
+    name="colmap",
+    title="COLMAP",
+    marks="cameras.bin or cameras.txt in it, in sparse/0 or in model",
+    source="COLMAP's documentation, Output format",
+    is_at=lambda path: path.is_dir() and _model_of(path) is not None,
+    read=_read,
+)

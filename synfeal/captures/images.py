@@ -1,0 +1,102 @@
+"""Pixels of captures: photographs, depth in the units a device stores, confidence."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from synfeal.captures.capture import Colors, Depth
+from synfeal.dataset.frame_files import IMAGE_DAMAGE, FrameFile, opened_image, read_image
+from synfeal.errors import InputError, read_as
+
+INVALID_MM = 65535
+
+
+def read_photograph(path: Path, width: int, height: int) -> Colors:
+    """Read a photograph (H, W, 3) as its pixels are stored: a capture's calibrations are of those.
+
+    Raises:
+        InputError: It is missing, damaged, or not of this size.
+    """
+    image = read_image(path, "RGB")
+    if image.size != (width, height):
+        raise InputError(
+            f"{path}: is of {image.width}x{image.height} pixels, its calibration of"
+            f" {width}x{height}; are both of one capture?"
+        )
+    return np.asarray(image)
+
+
+def decode_photograph(content: bytes, place: object) -> Colors:
+    """Decode a photograph (H, W, 3) from a file's bytes."""
+    with read_as(place, "an image", *IMAGE_DAMAGE), opened_image(content) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def size_of_image(path: Path) -> tuple[int, int]:
+    """Read the width and height of an image, pixels, without decoding it."""
+    with (
+        read_as(path, "an image", *IMAGE_DAMAGE),
+        path.open("rb") as file,
+        Image.open(io.BytesIO(file.read(2**20))) as image,
+    ):
+        return int(image.width), int(image.height)
+
+
+def read_depth_png(
+    path: FrameFile, units_per_m: float, confidence: Path | None = None, least: int = 1
+) -> Depth:
+    """Read a 16-bit depth image.
+
+    Args:
+        path: PNG or TIFF of whole numbers; 0 and 65535 are no measurement.
+        units_per_m: Stored value of one metre.
+        confidence: Image of the same size, of how sure the device is of each pixel.
+        least: Pixels of lower confidence count as not measured.
+
+    Returns:
+        Depth (H, W) in metres along the optical axis, 0 where nothing was measured.
+    """
+    values = np.asarray(read_image(path))
+    if values.ndim != 2 or values.dtype == np.uint8:
+        raise InputError(f"{path}: must be a 16-bit grey image of depth")
+    depth_m = (values / np.float32(units_per_m)).astype(np.float32)
+    depth_m[(values <= 0) | (values >= INVALID_MM)] = 0.0
+    if confidence is None:
+        return depth_m
+    return confident(depth_m, np.asarray(read_image(confidence)), least, confidence)
+
+
+def depth_reader(
+    path: FrameFile | None,
+    units_per_m: float,
+    confidence: Path | None = None,
+    least: int = 1,
+) -> Callable[[], Depth] | None:
+    """Bind :func:`read_depth_png` to a file; None where there is none."""
+    if path is None:
+        return None
+    return partial(read_depth_png, path, units_per_m, confidence, least)
+
+
+def existing(path: Path) -> Path | None:
+    """Return a path that is a file, or None."""
+    return path if path.is_file() else None
+
+
+def confident(
+    depth_m: Depth, confidence: NDArray[np.integer[Any]], least: int, place: object
+) -> Depth:
+    """Return depth (H, W) with 0 where the confidence (H, W) is below the least."""
+    if confidence.shape != depth_m.shape:
+        raise InputError(
+            f"{place}: is of {confidence.shape[::-1]} pixels, its depth of {depth_m.shape[::-1]}"
+        )
+    return np.where(confidence >= least, depth_m, np.float32(0.0))

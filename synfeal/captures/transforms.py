@@ -1,0 +1,154 @@
+"""``transforms.json`` of nerfstudio and instant-ngp: images and poses of OpenGL cameras."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from synfeal.camera.calibration import Calibration
+from synfeal.captures.capture import (
+    GL_FROM_CAM,
+    Capture,
+    CapturedFrame,
+    calibration,
+    partial_read,
+    resized,
+    rigid_pose,
+)
+from synfeal.captures.formats import CaptureFormat
+from synfeal.captures.images import depth_reader, read_photograph, size_of_image
+from synfeal.errors import InputError, read_as
+from synfeal.records.files import lies_in, read_json
+
+NAME = "transforms.json"
+# Depth is in millimetres unless ``depth_unit_scale_factor`` says what else.
+METRES_PER_UNIT = 1e-3
+PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV")
+FISHEYE = ("OPENCV_FISHEYE",)
+
+
+def _file_of(path: Path) -> Path:
+    return path / NAME if path.is_dir() else path
+
+
+def _is_at(path: Path) -> bool:
+    return (path / NAME).is_file() if path.is_dir() else path.name == NAME
+
+
+def _read(path: Path) -> Capture:
+    file = _file_of(path)
+    with read_as(file, "a file of transforms"):
+        values = read_json(file)
+    if not isinstance(values, dict) or not isinstance(values.get("frames"), list):
+        raise InputError(f"{file}: must hold a list 'frames'; is it of nerfstudio?")
+    if not values["frames"]:
+        raise InputError(f"{file}: its list 'frames' is empty")
+    with read_as(f"{file}: depth_unit_scale_factor", "a number", TypeError, ValueError):
+        units_per_m = 1.0 / float(values.get("depth_unit_scale_factor", METRES_PER_UNIT))
+    frames, missing = [], []
+    for index, entry in enumerate(values["frames"]):
+        place = f"{file}: frames[{index}]"
+        if not isinstance(entry, dict):
+            raise InputError(f"{place}: must hold a mapping of keys")
+        photograph = _image_at(file, entry.get("file_path"), f"{place}.file_path")
+        if photograph is None:
+            missing.append(str(entry["file_path"]))
+            continue
+        frames.append(_frame(file, photograph, values, entry, units_per_m, place))
+    if not frames:
+        raise InputError(f"{file}: {missing[0]} and all other images are missing; copy them, too")
+    frames.sort(key=lambda frame: frame.name)
+    notes = (f"{len(missing)} images are missing ({missing[0]}, ...)",) if missing else ()
+    return Capture(path, FORMAT.name, tuple(frames), up=None, notes=(*notes, *_world(values)))
+
+
+def _world(values: Mapping[str, Any]) -> tuple[str, ...]:
+    """Say where the world of the file is not that of the capture."""
+    if values.get("applied_scale", 1.0) != 1.0:
+        return (f"applied_scale is {values['applied_scale']}: lengths are not metres",)
+    return ()
+
+
+def _image_at(file: Path, name: Any, place: str) -> Path | None:
+    """Return the image of a name, with the ending that older files leave out; None if missing."""
+    if not isinstance(name, str) or not name:
+        raise InputError(f"{place}: must name an image")
+    found = file.parent / name
+    if not lies_in(found, file.parent):
+        raise InputError(f"{place}: '{name}' leads out of the folder; copy the image into it")
+    for candidate in (found, *(found.with_name(found.name + end) for end in (".png", ".jpg"))):
+        if candidate.is_file():
+            return candidate
+    return None
+
+
+def _frame(
+    file: Path,
+    photograph: Path,
+    values: Mapping[str, Any],
+    entry: Mapping[str, Any],
+    units_per_m: float,
+    place: str,
+) -> CapturedFrame:
+    size = size_of_image(photograph)
+    camera = _camera({**values, **entry}, size, place)
+    pose = rigid_pose(entry.get("transform_matrix"), f"{place}.transform_matrix") @ GL_FROM_CAM
+    depth_file, depth_camera = None, None
+    if entry.get("depth_file_path") is not None:
+        depth_file = _image_at(file, entry["depth_file_path"], f"{place}.depth_file_path")
+        if depth_file is None:
+            raise InputError(f"{place}.depth_file_path: {entry['depth_file_path']} is missing")
+        depth_camera = resized(camera, *size_of_image(depth_file))
+    return CapturedFrame(
+        name=str(photograph.relative_to(file.parent)),
+        read_color=partial_read(read_photograph, photograph, *size),
+        camera=camera,
+        world_from_cam=pose,
+        read_depth_m=depth_reader(depth_file, units_per_m),
+        depth_camera=depth_camera,
+        color_file=photograph,
+    )
+
+
+def _camera(values: Mapping[str, Any], size: tuple[int, int], place: str) -> Calibration:
+    """Read the camera of a frame: what it says itself goes before what the file says."""
+    model = values.get("camera_model", "OPENCV")
+    if model not in PERSPECTIVE + FISHEYE:
+        raise InputError(
+            f"{place}: camera_model {model} is not read; undistort the images to PINHOLE first"
+        )
+    with read_as(place, "a camera", TypeError, ValueError, KeyError):
+        width, height = int(values.get("w", size[0])), int(values.get("h", size[1]))
+        if "fl_x" in values:
+            fx = float(values["fl_x"])
+        else:  # of instant-ngp and Blender's synthetic scenes
+            fx = 0.5 * width / math.tan(0.5 * float(values["camera_angle_x"]))
+        fy = float(values.get("fl_y", fx))
+        cx, cy = float(values.get("cx", width / 2)), float(values.get("cy", height / 2))
+        names = ("k1", "k2", "k3", "k4") if model in FISHEYE else ("k1", "k2", "p1", "p2", "k3")
+        lens = tuple(float(values.get(name, 0.0)) for name in names)
+    if model in FISHEYE:
+        camera = calibration(
+            width,
+            height,
+            (fx, fy, cx, cy),
+            place,
+            projection="fisheye",
+            fisheye_k=lens,
+        )
+    else:
+        camera = calibration(width, height, (fx, fy, cx, cy), place, distortion=lens)
+    # Images that were made smaller after they were calibrated (images_2, images_4).
+    return camera if size == (width, height) else resized(camera, *size)
+
+
+FORMAT = CaptureFormat(
+    name="transforms",
+    title="nerfstudio or instant-ngp",
+    marks=NAME,
+    source="nerfstudio's documentation, Data conventions",
+    is_at=_is_at,
+    read=_read,
+)

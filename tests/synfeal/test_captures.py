@@ -1,0 +1,212 @@
+"""Captures of every format come back as they were written, and refuse what is no capture."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from synfeal.captures.capture import Capture
+from synfeal.captures.formats import CaptureFormat, capture_formats, format_of, read_capture
+from synfeal.captures.unpack import read_capture_record, unpack
+from synfeal.dataset.posed_sequence import read_posed_sequence
+from synfeal.errors import InputError
+from tests.support.capture_writers import (
+    CX,
+    CY,
+    FOCAL_PX,
+    HEIGHT,
+    WIDTH,
+    WRITERS,
+    Y_UP_FROM_ROOM,
+    Z_UP_FROM_ROOM,
+    shots,
+)
+
+FORMATS = sorted(WRITERS)
+LOSSLESS = ("7scenes", "transforms", "arkitscenes", "colmap", "colmap-binary")
+# Largest difference of a pose from the one it was written from: digits in the text.
+WRITTEN_TO = 1e-6
+
+
+def written(name: str, folder: Path) -> tuple[Path, np.ndarray]:
+    if name in ("record3d", "stray-scanner"):
+        pytest.importorskip("lzfse" if name == "record3d" else "cv2")
+    path = folder / (f"{name}.r3d" if name == "record3d" else name)
+    return path, WRITERS[name](path)
+
+
+@pytest.fixture(scope="module", params=FORMATS)
+def captured(request, tmp_path_factory) -> tuple[str, Capture, np.ndarray]:
+    path, world_from_room = written(request.param, tmp_path_factory.mktemp("capture"))
+    return request.param, read_capture(path), world_from_room
+
+
+def test_format_is_found_from_the_files_alone(captured):
+    name, capture, _ = captured
+    assert capture.format == name.removesuffix("-binary")
+    assert format_of(capture.path).name == capture.format
+
+
+def test_poses_come_back(captured):
+    _, capture, world_from_room = captured
+    expected = world_from_room @ shots().room_from_cam
+    assert len(capture) == len(expected)
+    np.testing.assert_allclose(capture.world_from_cam, expected, atol=WRITTEN_TO)
+
+
+def test_up_is_that_of_the_room_where_the_device_knows_it(captured):
+    name, capture, world_from_room = captured
+    if name in ("record3d", "stray-scanner", "polycam", "3d-scanner-app", "arkitscenes"):
+        np.testing.assert_allclose(capture.up, world_from_room[:3, :3] @ [0, 0, 1], atol=1e-12)
+    else:
+        assert capture.up is None
+
+
+def test_calibration_is_that_of_the_photographs(captured):
+    _, capture, _ = captured
+    one = capture.frames[0].camera
+    assert (one.width, one.height) == (WIDTH, HEIGHT)
+    np.testing.assert_allclose([one.fx, one.fy, one.cx, one.cy], [FOCAL_PX, FOCAL_PX, CX, CY])
+
+
+def test_pictures_and_depth_are_those_of_their_poses(captured):
+    name, capture, _ = captured
+    for number in (0, 17, len(capture) - 1):
+        frame = capture.frames[number]
+        off = np.abs(frame.read_color().astype(float) - shots().rgb[number])
+        assert (
+            off.max() == 0
+            if name in LOSSLESS
+            else off.mean() < (25.0 if name == "stray-scanner" else 6.0)
+        )
+        depth_m = frame.read_depth_m()
+        full = depth_m.shape == shots().depth_m[number].shape
+        expected = (shots().depth_m if full else shots().small_depth_m)[number]
+        np.testing.assert_allclose(depth_m, expected, atol=6e-4)
+        assert depth_m.shape == (frame.depth_camera.height, frame.depth_camera.width)
+        # The same view in other pixels: the optical axis meets the same share of the image.
+        assert frame.depth_camera.cx / depth_m.shape[1] == pytest.approx(
+            frame.camera.cx / WIDTH, abs=2e-3
+        )
+
+
+def test_unpacked_it_is_a_posed_sequence(captured, tmp_path):
+    _, capture, world_from_room = captured
+    done = unpack(capture, tmp_path / "sequence")
+    frames = read_posed_sequence(done.folder)
+    np.testing.assert_allclose(
+        frames.world_from_cam, world_from_room @ shots().room_from_cam, atol=WRITTEN_TO
+    )
+    assert frames.has_depth
+    record = read_capture_record(done.folder)
+    assert record["names"] == [frame.name for frame in capture.frames]
+    assert record["camera"]["color"]["fx"] == pytest.approx(FOCAL_PX)
+
+
+def test_names_are_unique_and_in_order(captured):
+    _, capture, _ = captured
+    names = [frame.name for frame in capture.frames]
+    assert len(set(names)) == len(names)
+    times = [frame.time_s for frame in capture.frames if frame.time_s is not None]
+    assert times == sorted(times)
+
+
+def test_a_phone_that_focuses_anew_is_drawn_as_one_camera(tmp_path):
+    """Frames at other focal lengths show a point of the world where the common camera would."""
+    path, _ = written("transforms", tmp_path)
+    values = json.loads((path / "transforms.json").read_text())
+    for index, entry in enumerate(values["frames"]):
+        entry["fl_x"] = entry["fl_y"] = FOCAL_PX * (1.0 + 0.01 * (index % 3 - 1))
+    (path / "transforms.json").write_text(json.dumps(values))
+    capture = read_capture(path)
+    done = unpack(capture, tmp_path / "sequence")
+    assert done.color.fx == pytest.approx(FOCAL_PX)
+    sequence = read_posed_sequence(done.folder)
+    for number, frame in enumerate(capture.frames[:3]):
+        changed = frame.camera.fx != pytest.approx(FOCAL_PX)
+        assert sequence.color[number].suffix == (".jpg" if changed else ".png")
+
+
+def test_frames_of_another_size_or_without_depth_are_left_out_and_told(tmp_path):
+    path, _ = written("3d-scanner-app", tmp_path)
+    (path / "depth_00003.png").unlink()
+    done = unpack(read_capture(path), tmp_path / "sequence")
+    assert len(done.names) == len(shots().rgb) - 1
+    assert any("1 frames have no depth" in note for note in done.notes)
+    assert any("no photograph" in note for note in done.notes)
+
+
+def test_low_confidence_is_no_measurement(tmp_path):
+    from PIL import Image
+
+    path, _ = written("3d-scanner-app", tmp_path)
+    sure = np.full(shots().small_depth_m[0].shape, 2, np.uint8)
+    sure[:, :50] = 0
+    Image.fromarray(sure).save(path / "conf_00000.png")
+    depth_m = read_capture(path).frames[0].read_depth_m()
+    assert (depth_m[:, :50] == 0).all()
+    assert (depth_m[:, 50:] > 0).any()
+
+
+def test_a_capture_of_a_program_without_vertical_says_nothing_of_up(tmp_path):
+    path, _ = written("colmap", tmp_path)
+    assert read_capture(path).up is None
+    assert not np.allclose(Y_UP_FROM_ROOM, Z_UP_FROM_ROOM)
+
+
+def test_every_format_says_where_it_is_described():
+    for one in capture_formats().values():
+        assert isinstance(one, CaptureFormat)
+        assert one.source
+        assert one.marks
+
+
+BROKEN = [
+    ("transforms", "transforms.json", "{", "transforms.json"),
+    ("transforms", "transforms.json", '{"frames": []}', "'frames' is empty"),
+    ("transforms", "transforms.json", '{"frames": [{"file_path": "../x.png"}]}', "leads out"),
+    ("transforms", "transforms.json", '{"frames": [{"file_path": "x.png"}]}', "missing"),
+    ("polycam", "keyframes/corrected_cameras/1700000000000000.json", "{}", "'t_00' is missing"),
+    ("3d-scanner-app", "frame_00000.json", '{"cameraPoseARFrame": [1, 2]}', "frame_00000.json"),
+    ("stray-scanner", "odometry.csv", "timestamp,frame\n1,2\n", "no column 'x'"),
+    ("stray-scanner", "camera_matrix.csv", "1,2\n3,4\n", "three rows"),
+    ("arkitscenes", "lowres_wide.traj", "1 2 3\n", "7 finite numbers"),
+    ("scannet", "intrinsic/intrinsic_color.txt", "1 2", "16 finite numbers"),
+    ("12scenes", "info.txt", "m_colorWidth = 5\n", "is missing"),
+    ("colmap", "sparse/0/cameras.txt", "1 PINHOLE x\n", "sparse/0"),
+]
+
+
+def see_all(path: Path) -> None:
+    for frame in read_capture(path).frames:
+        frame.read_color()
+
+
+@pytest.mark.parametrize(("name", "file", "content", "said"), BROKEN)
+def test_damage_is_one_line_that_names_the_file(name, file, content, said, tmp_path):
+    path, _ = written(name, tmp_path)
+    (path / file).write_text(content)
+    with pytest.raises(InputError, match=said) as refused:
+        see_all(path)
+    assert str(path) in str(refused.value)
+
+
+def test_what_is_no_capture_is_told_what_one_is(tmp_path):
+    with pytest.raises(InputError, match=r"no capture that is known.*Polycam"):
+        format_of(tmp_path)
+    with pytest.raises(InputError, match="not there"):
+        format_of(tmp_path / "nothing")
+
+
+def test_a_folder_that_is_two_captures_asks_which(tmp_path):
+    path, _ = written("transforms", tmp_path)
+    WRITERS["colmap"](path)
+    with pytest.raises(InputError, match="--format"):
+        read_capture(path)
+    assert read_capture(path, "colmap").format == "colmap"
+    assert read_capture(path, "transforms").format == "transforms"
+    with pytest.raises(InputError, match="none of"):
+        read_capture(path, "fbx")
