@@ -19,7 +19,7 @@ import numpy as np
 from PIL import Image
 
 from synfeal.camera.calibration import Calibration
-from synfeal.captures.capture import Capture, CapturedFrame, Colors, Depth
+from synfeal.captures.capture import Capture, CapturedFrame, Colors, Depth, resized
 from synfeal.captures.views import (
     common_camera,
     has_lens,
@@ -38,6 +38,10 @@ FARTHEST_MM = 65534
 # Below, a photograph is kept as it is: what a feature's place is known to.
 SAME_CAMERA_PX = 0.25
 JPEG_QUALITY = 95
+# Longest side of photographs: a scan's vertices are a centimetre apart, which at two metres is
+# seven pixels of a phone's 1920, and larger images take longer at every later stage.
+LONGEST_PX = 1280
+SUFFIXES = (".jpg", ".jpeg", ".png")
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,7 @@ def unpack(
     folder: Path,
     *,
     stride: int = 1,
+    longest_px: int = LONGEST_PX,
     on_frame: Callable[[], object] = lambda: None,
 ) -> Unpacked:
     """Write a capture as a posed sequence.
@@ -72,6 +77,7 @@ def unpack(
         capture: Photographs with poses, and depth or none.
         folder: To create; it appears when it is complete.
         stride: Take every so many frames.
+        longest_px: Photographs with a longer side are made smaller, pixels.
         on_frame: Called after every frame.
 
     Returns:
@@ -84,7 +90,7 @@ def unpack(
     frames = frames[::stride]
     if len(frames) < 2:
         raise InputError(f"{capture.path}: {len(frames)} of its frames can be used; two are needed")
-    color = common_camera([frame.camera for frame in frames])
+    color = _at_most(common_camera([frame.camera for frame in frames]), longest_px)
     depth = None
     if frames[0].depth_camera is not None:
         depth = common_camera([_depth_camera(frame) for frame in frames])
@@ -100,6 +106,14 @@ def unpack(
         write_json(temporary / RECORD, _record(capture, frames, color, depth))
     notes = (*capture.notes, *notes, *far.notes())
     return Unpacked(folder, color, depth, tuple(frame.name for frame in frames), notes)
+
+
+def _at_most(camera: Calibration, longest_px: int) -> Calibration:
+    """Return a camera, or the same view in an image whose longer side is no longer than that."""
+    factor = longest_px / max(camera.width, camera.height)
+    if factor >= 1.0:
+        return camera
+    return resized(camera, round(camera.width * factor), round(camera.height * factor))
 
 
 def _depth_camera(frame: CapturedFrame) -> Calibration:
@@ -141,15 +155,20 @@ def _is_kept(own: Calibration, shared: Calibration) -> bool:
 
 
 def _write_color(frame: CapturedFrame, camera: Calibration, stem: Path) -> None:
-    """Copy a photograph, or draw it anew where its camera is another."""
-    if _is_kept(frame.camera, camera):
-        file = frame.color_file
-        if file is not None and file.suffix.lower() in (".jpg", ".jpeg", ".png"):
-            _copy(file, Path(f"{stem}.color{file.suffix.lower()}"))
-            return
-        image: Colors = frame.read_color()
-    else:
-        image = redrawn_color(frame.read_color(), frame.camera, camera)
+    """Copy a photograph, or draw it anew where its camera or its size is another."""
+    own, size = frame.camera, (camera.width, camera.height)
+    is_of_size = (own.width, own.height) == size
+    file = frame.color_file
+    can_stay = is_of_size and _is_kept(own, camera)
+    if can_stay and file is not None and file.suffix.lower() in SUFFIXES:
+        _copy(file, Path(f"{stem}.color{file.suffix.lower()}"))
+        return
+    image: Colors = frame.read_color()
+    if not is_of_size:
+        smaller = Image.fromarray(image).resize(size, Image.Resampling.BOX)
+        image, own = np.asarray(smaller), resized(own, *size)
+    if not _is_kept(own, camera):
+        image = redrawn_color(image, own, camera)
     Image.fromarray(image).save(f"{stem}.color.jpg", quality=JPEG_QUALITY, subsampling=0)
 
 

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+import os
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from synfeal.captures.capture import Capture
 from synfeal.captures.formats import CaptureFormat, capture_formats, format_of, read_capture
 from synfeal.captures.unpack import read_capture_record, unpack
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.errors import InputError
+from tests import ROOT
 from tests.support.capture_writers import (
     CX,
     CY,
@@ -139,9 +145,18 @@ def test_frames_of_another_size_or_without_depth_are_left_out_and_told(tmp_path)
     assert any("no photograph" in note for note in done.notes)
 
 
-def test_low_confidence_is_no_measurement(tmp_path):
-    from PIL import Image
+def test_large_photographs_become_smaller_and_their_camera_with_them(tmp_path):
+    """Where the optical axis meets the image stays the same share of its sides."""
+    path, _ = written("colmap", tmp_path)
+    done = unpack(read_capture(path), tmp_path / "sequence", longest_px=120)
+    assert (done.color.width, done.color.height) == (120, 90)
+    assert done.color.fx / 120 == pytest.approx(FOCAL_PX / WIDTH)
+    small = np.asarray(Image.open(tmp_path / "sequence" / "frame-000000.color.jpg"), float)
+    blocks = shots().rgb[0].reshape(90, 2, 120, 2, 3).mean(axis=(1, 3))
+    assert np.abs(small - blocks).mean() < 3.0
 
+
+def test_low_confidence_is_no_measurement(tmp_path):
     path, _ = written("3d-scanner-app", tmp_path)
     sure = np.full(shots().small_depth_m[0].shape, 2, np.uint8)
     sure[:, :50] = 0
@@ -210,3 +225,45 @@ def test_a_folder_that_is_two_captures_asks_which(tmp_path):
     assert read_capture(path, "transforms").format == "transforms"
     with pytest.raises(InputError, match="none of"):
         read_capture(path, "fbx")
+
+
+PAGE = ROOT / "docs" / "adding.md"
+READ = """
+from pathlib import Path
+from synfeal.captures.formats import read_capture
+capture = read_capture(Path("cart"))
+frame = capture.frames[1]
+print(capture.format, len(capture), frame.world_from_cam[0, 3], frame.read_color().shape)
+print(float(frame.read_depth_m()[5, 7]))
+"""
+
+
+def test_a_format_of_another_package_is_found_and_read(tmp_path):
+    """The example of the page, installed as a person would."""
+    text = re.search(r"`my_captures/cart\.py`:\n\n```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    (tmp_path / "my_captures").mkdir()
+    (tmp_path / "my_captures/__init__.py").touch()
+    (tmp_path / "my_captures/cart.py").write_text(text[1])
+    info = tmp_path / "my_captures-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-captures\nVersion: 1.0\n")
+    entry = "[synfeal.captures]\ncart = my_captures.cart:FORMAT\n"
+    (info / "entry_points.txt").write_text(entry)
+    cart = tmp_path / "cart"
+    cart.mkdir()
+    rows = ["number,x,y,z,qx,qy,qz,qw", "0,0,0,0,0,0,0,1", "1,2.5,0,0,0,0,0,1"]
+    (cart / "cart.csv").write_text("\n".join(rows) + "\n")
+    for number in range(2):
+        Image.new("RGB", (640, 480)).save(cart / f"{number:04d}.png")
+        depth_mm = np.full((480, 640), 1250, np.uint16)
+        Image.fromarray(depth_mm).save(cart / f"{number:04d}.depth.png")
+    path = os.pathsep.join([str(tmp_path), str(ROOT)])
+    done = subprocess.run(
+        [sys.executable, "-c", READ],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split("\n")[:2] == ["cart 2 2.5 (480, 640, 3)", "1.25"]
