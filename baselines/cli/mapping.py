@@ -62,7 +62,12 @@ def map(arguments: argparse.Namespace) -> None:  # noqa: A001 (the name of the c
         raise InputError(f"--seed: must be 0 to 2^63 - 1, found {arguments.seed}")
     start, stop = arguments.frames or (0, None)
     choice = FrameChoice(start, stop, every=arguments.every, most=arguments.most)
-    frames = read_map_frames(arguments.dataset, choice, camera_options(arguments))
+    frames = read_map_frames(
+        folder=arguments.dataset,
+        choice=choice,
+        cameras=camera_options(arguments),
+        poses_are=arguments.poses_are or "world_from_cam",
+    )
     made = build_map(frames, arguments.out, arguments.seed)
     print(f"{arguments.out}: {describe_map(made)}, {made.record['seconds']:.0f} s")
     print(f"synfeal localize {arguments.out} photos/ --out poses.csv")

@@ -17,10 +17,12 @@ from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_seque
 from synfeal.dataset.sevenscenes import read_split
 from synfeal.dataset.world import read_sequence_from_world
 from synfeal.errors import InputError
+from synfeal.geometry.axes import PosesAre, meant_poses
 from synfeal.mesh.load import UpAxis
 from synfeal.records.files import read_json
-from synfeal.scanning.camera import CameraOptions, RgbdCamera, rgbd_camera
+from synfeal.scanning.camera import CameraOptions, RgbdCamera, posed_depth, rgbd_camera
 from synfeal.scanning.reading import Depth, image_size, read_color, read_depth_m
+from synfeal.validation.depth_agreement import PosedDepth
 
 Array = NDArray[np.float64]
 
@@ -62,6 +64,12 @@ class MapFrames:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    @property
+    def posed_depth(self) -> PosedDepth:
+        """Depth and poses, to be checked against each other."""
+        frames = PosedFrames(self.names, self.color, self.depth, self.world_from_cam)
+        return posed_depth(frames, self.rgbd, options=frozenset({"--poses-are", "--depth-scale"}))
 
     @property
     def camera(self) -> CameraConfig:
@@ -165,7 +173,12 @@ class FrameChoice:
         return rows
 
 
-def read_map_frames(folder: Path, choice: FrameChoice, cameras: CameraOptions) -> MapFrames:
+def read_map_frames(
+    folder: Path,
+    choice: FrameChoice,
+    cameras: CameraOptions,
+    poses_are: PosesAre = "world_from_cam",
+) -> MapFrames:
     """Read which frames a folder has, and their cameras; of images only the first are opened.
 
     Args:
@@ -173,6 +186,7 @@ def read_map_frames(folder: Path, choice: FrameChoice, cameras: CameraOptions) -
             a posed sequence of photographs with depth.
         choice: Choice among the frames.
         cameras: Cameras given beside what the data set says.
+        poses_are: Convention of the poses.
 
     Raises:
         InputError: There is no such folder, a frame lacks a file, or a calibration cannot be used.
@@ -198,7 +212,7 @@ def read_map_frames(folder: Path, choice: FrameChoice, cameras: CameraOptions) -
         names=tuple(found.names[row] for row in rows),
         color=tuple(color),
         depth=tuple(depth),
-        world_from_cam=found.world_from_cam[rows],
+        world_from_cam=meant_poses(found.world_from_cam[rows], poses_are),
         rgbd=rgbd,
         sequence_from_world=read_sequence_from_world(folder) if rendered else np.eye(4),
         mesh_file=_mesh_file(folder / MANIFEST) if rendered else MeshFile(),

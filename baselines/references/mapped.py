@@ -49,6 +49,7 @@ from synfeal.records.files import (
 )
 from synfeal.records.provenance import provenance
 from synfeal.records.tables import read_records
+from synfeal.validation.depth_agreement import check_depth
 
 Array = NDArray[np.float64]
 
@@ -144,10 +145,12 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         seed: Seed of the vocabulary.
 
     Raises:
-        InputError: An image cannot be read, there are too few features, or ``out`` exists.
+        InputError: An image cannot be read, depth and poses do not fit together, there are too few
+            features, or ``out`` exists.
     """
     refuse_existing(out)
     refuse_inside(out, frames.source)
+    check_depth(frames.posed_depth)
     began = time.perf_counter()
     features, views = _read_frames(frames)
     if len(features.slope) < FEWEST_FEATURES:

@@ -12,7 +12,7 @@ import logging
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,14 +29,17 @@ from synfeal.dataset.finish import MANIFEST
 from synfeal.dataset.frame_files import FrameFile, read_image
 from synfeal.dataset.packed import fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
-from synfeal.dataset.posed_sequence import PosedFrames, read_posed_sequence
+from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
 from synfeal.dataset.render_sequence import Progress
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
 from synfeal.dataset.world import read_sequence_from_world
 from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import file_sha256, read_json, write_json
+from synfeal.scanning.camera import MILLIMETRES, TUM_UNITS_PER_M, RgbdCamera, posed_depth
+from synfeal.scanning.reading import image_size
 from synfeal.validation.camera import camera_of_dataset
+from synfeal.validation.depth_agreement import check_depth
 
 log = logging.getLogger(__name__)
 
@@ -69,6 +72,7 @@ class OwnFrames:
     Attributes:
         folder: Folder of the data set.
         color: Image of each frame.
+        depth: Depth image of each frame; None where a frame has none.
         world_from_cam: Poses (N, 4, 4) in the data set's own world.
         path: Index (N,) of the path of each frame, from 0: what is held out as a whole.
         camera: Perspective camera of the frames, where the data set says so; None for photographs.
@@ -80,6 +84,7 @@ class OwnFrames:
 
     folder: Path
     color: tuple[FrameFile, ...]
+    depth: tuple[FrameFile | None, ...]
     world_from_cam: Array
     path: NDArray[np.int64]
     camera: FrameCamera | None
@@ -142,6 +147,7 @@ def read_own_frames(folder: Path, ranges: Sequence[FrameRange]) -> OwnFrames:
     return OwnFrames(
         folder=folder,
         color=tuple(file for part in parts for file in part.color),
+        depth=tuple(file for part in parts for file in part.depth),
         world_from_cam=np.concatenate([part.world_from_cam for part in parts]),
         path=_blocks(parts) if path is None else path,
         camera=None if camera is None or wide else _frame_camera(camera),
@@ -150,6 +156,39 @@ def read_own_frames(folder: Path, ranges: Sequence[FrameRange]) -> OwnFrames:
         sequence_from_world=read_sequence_from_world(folder),
         scene=_scene_of(folder),
     )
+
+
+def check_posed_depth(own: OwnFrames, photographs: PhotographCamera) -> None:
+    """Refuse poses that contradict the depth of their frames.
+
+    Nothing is compared where there is no depth, or its camera is not known.
+
+    Args:
+        own: Frames of a data set.
+        photographs: Camera of photographs, which is that of depth where depth is registered to it.
+
+    Raises:
+        InputError: Depth and poses do not fit together; the message says what was meant.
+    """
+    depth = [file for file in own.depth if file is not None]
+    if len(depth) < len(own) or own.wide is not None:
+        return
+    known: CameraConfig | None = None
+    if own.camera is not None:
+        known = CameraConfig.model_validate(own.camera.model_dump())
+    elif (given := photographs.of(read_image(own.color[0]), own.color[0])) is not None:
+        known = CameraConfig.model_validate(asdict(given))
+    if known is None or image_size(depth[0]) != (known.width, known.height):
+        return
+    units_per_m = TUM_UNITS_PER_M if is_tum(own.folder) else MILLIMETRES
+    rgbd = RgbdCamera(known, known, np.eye(4), units_per_m)
+    frames = PosedFrames(
+        names=tuple(map(str, own.color)),
+        color=own.color,
+        depth=own.depth,
+        world_from_cam=own.world_from_cam,
+    )
+    check_depth(posed_depth(frames, rgbd, options=frozenset()))
 
 
 def _ranges_of(

@@ -24,6 +24,7 @@ from baselines.training.own_frames import (
     FrameRange,
     OwnFrames,
     PackedFrames,
+    check_posed_depth,
     pack_own_frames,
     read_own_frames,
 )
@@ -135,6 +136,8 @@ def train(job: TrainJob) -> TrainedModel:
         return _finished(job, settings)
     sets = [read_own_frames(folder, job.ranges) for folder in job.datasets]
     _refuse_useless(job, sets)
+    for own in sets:
+        check_posed_depth(own, job.photographs)
     is_new = not job.out.exists()
     job.out.mkdir(parents=True, exist_ok=True)
     try:

@@ -17,7 +17,7 @@ from synfeal.records.files import read_json
 
 # Of synfeal.scanning.camera, which --help need not load.
 PRESETS = ("7scenes", "tum-fr1", "tum-fr2", "tum-fr3")
-DIRECTIONS = ("world_from_cam", "cam_from_world")
+POSES_ARE = ("world_from_cam", "cam_from_world", "opengl")
 MARGIN_M, MARGIN_DEG = 0.2, 10.0  # of --like
 
 if TYPE_CHECKING:
@@ -35,6 +35,12 @@ FILE: dict[str, Any] = {"type": Path, "metavar": "FILE"}
 
 # Calibrations of posed photographs with depth; `synfeal map` takes the same.
 RGBD_OPTIONS = (
+    option(
+        "--poses-are",
+        "direction of the poses, or opengl: world_from_cam of cameras that look along -z, y up"
+        " (world_from_cam)",
+        choices=POSES_ARE,
+    ),
     option("--preset", "known calibrations of colour and depth", choices=PRESETS),
     option("--color-camera", "calibration of the photographs (docs/cameras.md)", **FILE),
     option("--depth-camera", "calibration of the depth images (that of colour)", **FILE),
@@ -324,7 +330,6 @@ def inspect(arguments: argparse.Namespace) -> None:
     ),
     option("--out", "GLB to write; .json and .png beside it", type=Path, required=True),
     *RGBD_OPTIONS,
-    option("--poses-are", "direction of the poses (world_from_cam)", choices=DIRECTIONS),
     option(
         "--frames",
         "first frame and one past the last (all)",

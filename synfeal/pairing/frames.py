@@ -14,6 +14,7 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.errors import InputError
 from synfeal.validation.camera import camera_of_dataset
+from synfeal.validation.depth_agreement import PosedDepth
 from synfeal.validation.frames import check_names, kinds_of, read_poses
 from synfeal.validation.listing import COLOR, DEPTH, Frame, list_sequences, read_depth_mm
 from synfeal.validation.manifest import check_splits, read_splits
@@ -46,6 +47,17 @@ class DepthFrames:
     def image(self, index: int) -> str:
         """Return the name of a colour image in the data set."""
         return f"{self.frames[index].name}.{COLOR}"
+
+    @property
+    def posed_depth(self) -> PosedDepth:
+        """Depth and poses, to be checked against each other."""
+        return PosedDepth(
+            files=[frame.path(DEPTH) for frame in self.frames],
+            read_m=self.depth_m,
+            world_from_cam=self.world_from_cam,
+            camera=self.camera,
+            depth_from_cam=np.eye(4),
+        )
 
     def depth_m(self, index: int) -> NDArray[np.float32]:
         """Read depth (H, W) of a frame in metres, inf for nothing.

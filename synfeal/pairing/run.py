@@ -26,6 +26,7 @@ from synfeal.records.files import (
     write_text,
 )
 from synfeal.records.tables import MAYBE_TEXT, NUMBER, TEXT, read_frame, rows_of, write_frame
+from synfeal.validation.depth_agreement import check_depth
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -118,7 +119,7 @@ def find_pairs(job: PairsJob) -> Found:
 
     Raises:
         InputError: An option is out of its bounds, ``out`` is not empty, the data set cannot be
-            used, or no two frames can be compared.
+            used, its depth and poses do not fit together, or no two frames can be compared.
     """
     job.check()
     refuse_existing(job.out)
@@ -139,6 +140,8 @@ def find_pairs(job: PairsJob) -> Found:
     _refuse_fine_grid(job.grid, frames)
     if not any(len(group) > 1 for group in groups):
         raise InputError(f"{job.dataset}: has no two frames to compare; give another --among")
+    if frames.camera.projection is None:
+        check_depth(frames.posed_depth)
     with atomic_directory(job.out) as directory:
         table, compared = _table(job, frames, groups)
         if job.flow:

@@ -23,6 +23,7 @@ from synfeal.dataset.finish import MANIFEST
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.dataset.world import read_scan_record, rigid_motion_of
 from synfeal.errors import InputError, read_as
+from synfeal.geometry.axes import meant_poses
 from synfeal.geometry.poses import inverse
 from synfeal.geometry.rotations import BODY_FROM_CAM
 from synfeal.records.files import read_json
@@ -83,8 +84,7 @@ def like_trajectory(
     poses = read_posed_sequence(sequence, frames).world_from_cam
     record = read_scan_record(mesh)
     if record is not None:
-        if record.get("poses_are") == "cam_from_world":
-            poses = inverse(poses)
+        poses = meant_poses(poses, record.get("poses_are", "world_from_cam"))
         poses = inverse(rigid_motion_of(record, mesh.with_suffix(".json"))) @ poses
     low, high = poses[:, :3, 3].min(axis=0) - margin_m, poses[:, :3, 3].max(axis=0) + margin_m
     roll_deg, pitch_deg, yaw_deg = np.rad2deg(rpy_of(poses[:, :3, :3])).T

@@ -15,12 +15,15 @@ from scipy.spatial.transform import Rotation
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
 from synfeal.dataset.finish import MANIFEST
+from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import pose_matrix
 from synfeal.records.files import read_json
+from synfeal.scanning.reading import read_depth_m
+from synfeal.validation.depth_agreement import PosedDepth
 
 Array = NDArray[np.float64]
-MILLIMETRES = 1000.0
+MILLIMETRES, TUM_UNITS_PER_M = 1000.0, 5000.0  # what a metre of depth is stored as
 MOST_ASIDE_M = 10.0  # of the depth camera from the colour camera
 
 
@@ -117,6 +120,27 @@ PRESETS: Mapping[str, RgbdCamera] = {
 }
 
 
+def posed_depth(frames: PosedFrames, camera: RgbdCamera, options: frozenset[str]) -> PosedDepth:
+    """Describe frames with depth for the check of depth against poses.
+
+    Args:
+        frames: Frames that all have depth.
+        camera: Cameras of colour and depth.
+        options: Options that remedies may name, see :class:`PosedDepth`.
+    """
+    files = [file for file in frames.depth if file is not None]
+    size = (camera.depth.width, camera.depth.height)
+    return PosedDepth(
+        files=files,
+        read_m=lambda index: read_depth_m(files[index], camera.depth_units_per_m, size),
+        world_from_cam=frames.world_from_cam,
+        camera=camera.depth,
+        depth_from_cam=camera.depth_from_color,
+        units_per_m=camera.depth_units_per_m,
+        options=options,
+    )
+
+
 @dataclass(frozen=True)
 class CameraOptions:
     """Statements of a person about the cameras; None where nothing is said.
@@ -176,7 +200,7 @@ def rgbd_camera(
                 f" ({', '.join(PRESETS)}), --color-camera FILE or --color-focal PX, and the same"
                 " for depth where depth is not registered to colour"
             )
-        units = 5000.0 if is_tum else MILLIMETRES
+        units = TUM_UNITS_PER_M if is_tum else MILLIMETRES
         base = RgbdCamera(color, depth or color, np.eye(4), units, "options")
     elif color is not None or depth is not None:
         base = replace(base, color=color or base.color, depth=depth or base.depth, source="options")

@@ -28,6 +28,7 @@ from synfeal.scanning.camera import RgbdCamera
 from synfeal.scanning.fusion import FusedSurface
 from synfeal.scanning.reading import read_color, read_depth_m
 from synfeal.scanning.seen import Floats, project, sampled, seen_points, within
+from synfeal.validation.depth_agreement import spread
 
 N_POINTS, N_FRAMES = 40_000, 60
 SHRINK = 2  # sides of photographs: averages noise and compression, and widens the valley
@@ -125,12 +126,6 @@ def sightings_of(
         photographs.append((rgb @ LUMA)[..., None])
         on_frame()
     return Sightings(np.concatenate(vertex), tuple(local), tuple(photographs), count)
-
-
-def spread(total: int, count: int) -> list[int]:
-    """Return at most ``count`` indices below ``total``, evenly spread."""
-    count = min(count, total)
-    return [index * total // count for index in range(count)]
 
 
 @dataclass(frozen=True)

@@ -16,22 +16,35 @@ from numpy.typing import NDArray
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
 from synfeal.dataset.render_sequence import Progress
 from synfeal.errors import InputError
+from synfeal.geometry.axes import PosesAre, meant_poses
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.records.files import write_json
-from synfeal.scanning.agreement import DepthAgreement, check_depth
-from synfeal.scanning.camera import CameraOptions, RgbdCamera, intrinsics_record, rgbd_camera
+from synfeal.scanning.camera import (
+    CameraOptions,
+    RgbdCamera,
+    intrinsics_record,
+    posed_depth,
+    rgbd_camera,
+)
 from synfeal.scanning.cleaning import without_small_pieces
 from synfeal.scanning.coloring import colors_of
 from synfeal.scanning.consistency import N_FRAMES as FIT_FRAMES
-from synfeal.scanning.consistency import ColorFit, fit_color, sightings_of, spread, with_color
+from synfeal.scanning.consistency import ColorFit, fit_color, sightings_of, with_color
 from synfeal.scanning.fusion import FusedSurface, fuse
 from synfeal.scanning.gravity import Gravity, find_gravity, upright_world
 from synfeal.scanning.picture import Comparison, compare, write_picture
 from synfeal.scanning.reading import image_size
+from synfeal.validation.depth_agreement import (
+    DepthAgreement,
+    best_focal_px,
+    check_depth,
+    spread,
+)
 
 Array = NDArray[np.float64]
+OPTIONS = frozenset({"--poses-are", "--depth-scale"})
 COMPARED = 24  # photographs that the scan is compared with
 # Beyond, a focal length is not that of the camera: tolerances of lenses are a tenth of it.
 WRONG_FOCAL = 0.03
@@ -54,7 +67,8 @@ class ScanJob:
         voxel_m: Edge of a voxel, metres.
         max_depth_m: Depth beyond is left out.
         min_piece_m2: Connected pieces of less surface are dropped.
-        poses_are: Direction of the poses.
+        poses_are: Direction of the poses, or ``opengl`` for ``world_from_cam`` of cameras with
+            OpenGL's axes.
         gravity: Way down (3,) in the sequence's world; ``find`` from the planes of the scene;
             ``keep`` leaves the axes as they are.
         keep_calibration: Use the colour calibration as it is given, not as photographs agree best.
@@ -69,7 +83,7 @@ class ScanJob:
     voxel_m: float = 0.01
     max_depth_m: float = 4.0
     min_piece_m2: float = 0.02
-    poses_are: Literal["world_from_cam", "cam_from_world"] = "world_from_cam"
+    poses_are: PosesAre = "world_from_cam"
     gravity: tuple[float, float, float] | Literal["find", "keep"] = "find"
     keep_calibration: bool = False
 
@@ -123,7 +137,7 @@ def scan(job: ScanJob) -> Scan:
     every = _read(job)
     frames, held_out = every[:: job.stride], _held_out(every, job.stride)
     camera = _camera(job, frames)
-    agreement = check_depth(frames, camera)
+    agreement = check_depth(posed_depth(frames, camera, options=OPTIONS))
     total = 2 * len(frames) + min(FIT_FRAMES, len(frames)) + min(COMPARED, len(held_out))
     with Progress(total, "scan") as progress:
         with _stage(progress, "depth fused", len(frames)):
@@ -172,9 +186,7 @@ def _read(job: ScanJob) -> PosedFrames:
         raise InputError(
             f"{job.sequence}: has no depth images; a scan is made of photographs with depth"
         )
-    if job.poses_are == "cam_from_world":
-        every = replace(every, world_from_cam=inverse(every.world_from_cam))
-    return every
+    return replace(every, world_from_cam=meant_poses(every.world_from_cam, job.poses_are))
 
 
 def _held_out(every: PosedFrames, stride: int) -> PosedFrames:
@@ -282,7 +294,7 @@ def _record(
         "max_depth_m": job.max_depth_m,
         "gravity": found if found else "given" if job.gravity != "keep" else "kept",
         "depth_agreement": None if np.isnan(agreement.share) else agreement.share,
-        "depth_best_focal_px": agreement.best_focal_px,
+        "depth_best_focal_px": best_focal_px(agreement.sample, camera.depth),
         "color_disagreement": fit.record,
         "photographs": {
             "compared": len(compared),

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from synfeal.errors import InputError
 from synfeal.records.progress import Progress
 from synfeal.validation.camera import KnownCamera, camera_of_dataset
 from synfeal.validation.consistency import check_consistency, check_stereo
+from synfeal.validation.depth_agreement import PosedDepth, compare_depth
 from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
 from synfeal.validation.layers import check_layers
 from synfeal.validation.listing import (
@@ -21,6 +25,7 @@ from synfeal.validation.listing import (
     SequenceListing,
     frames_of,
     list_sequences,
+    read_depth_mm,
 )
 from synfeal.validation.manifest import (
     check_manifest,
@@ -128,8 +133,50 @@ def _geometry(
     pairs = choose_pairs(sequences, rigid, every_pair)
     if not pairs:
         return [Check("pairs", "no two frames of a sequence to compare", skipped=True)]
+    checks = [_convention(rigid, camera)] if camera.depth.projection is None else []
     with Progress(len(pairs), "pair", "compare") as progress:
-        return check_consistency(pairs, rigid, camera, progress.update)
+        return checks + check_consistency(pairs, rigid, camera, progress.update)
+
+
+def _convention(rigid: Poses, camera: KnownCamera) -> Check:
+    """Compare depth and poses of frames from all over the set, and name what was meant."""
+    frames = tuple(rigid)
+    size = (camera.depth.width, camera.depth.height)
+
+    def read_m(index: int) -> NDArray[np.float32]:
+        return measured_m(read_depth_mm(frames[index].path(DEPTH)), size)
+
+    try:
+        found = compare_depth(
+            PosedDepth(
+                files=[frame.path(DEPTH) for frame in frames],
+                read_m=read_m,
+                world_from_cam=np.array([rigid[frame] for frame in frames]),
+                camera=camera.depth,
+                depth_from_cam=np.eye(4),
+            )
+        )
+    except InputError:  # an image is damaged, which another check tells
+        return Check("convention", "a depth image cannot be read", skipped=True)
+    if np.isnan(found.share) and found.problem is None:
+        return Check("convention", "frames do not see the same things", skipped=True)
+    text = f"{found.share:.0%} of what frames measure is where others see it"
+    failures = () if found.problem is None else (found.problem,)
+    if camera.assumed:
+        said = f"{text}; not judged, the camera is assumed"
+        return Check("convention", said, skipped=True)
+    return Check("convention", text, failures)
+
+
+def measured_m(depth_mm: NDArray[np.uint16], size: tuple[int, int]) -> NDArray[np.float32]:
+    """Return depth (H, W) in metres, 0 for nothing.
+
+    Raises:
+        InputError: It is not of ``size``, width and height.
+    """
+    if depth_mm.shape[::-1] != size:
+        raise InputError("a depth image is of another size than its camera")
+    return np.where(depth_mm < 65535, depth_mm / np.float32(1000.0), np.float32(0.0))
 
 
 def report(dataset: Path, checks: Sequence[Check]) -> str:

@@ -46,7 +46,7 @@ def test_a_sound_data_set_passes(planar, capsys):
     assert main(["validate", str(planar)]) == 0
     captured = capsys.readouterr()
     verdicts = [line.split()[1] for line in captured.out.splitlines()[1:]]
-    assert verdicts == ["ok"] * 14, captured.out
+    assert verdicts == ["ok"] * 15, captured.out
     assert "error" not in captured.err
 
 
@@ -182,7 +182,7 @@ def small_random(tmp_path_factory):
     [
         (None, set()),
         (depth_in_metres, {"images", "pairs"}),
-        (depth_in_centimetres, {"pairs"}),
+        (depth_in_centimetres, {"convention", "pairs"}),
         (swapped_frames, {"depth", "surfaces"}),
         (swapped_colors, {"colours"}),
     ],
