@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from benchmarks.processes import ROOT, Taken, seconds_of_process
 from synfeal.collection.detail import write_detail
 from synfeal.config.dataset import CameraConfig, RenderConfig
-from synfeal.dataset.frame_files import read_image
+from synfeal.dataset.images import read_image
 from synfeal.dataset.packed import read_packed
 from synfeal.dataset.pose_table import read_frames, write_pose_table
 from synfeal.errors import exit_status

@@ -19,7 +19,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
-from synfeal.dataset.frame_files import read_image
+from synfeal.dataset.images import read_image
 from synfeal.dataset.sequence_listing import COLOR
 from synfeal.pairing.correspondence import State
 from synfeal.pairing.flow import flow_between

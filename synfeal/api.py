@@ -21,6 +21,7 @@ from synfeal.collection.run import collect as run_collection
 from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig, DatasetConfig
 from synfeal.config.options import SCENE, dataset_config, options_named, render_configs
+from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.layer_files import read_instances, read_mask, read_normals
 from synfeal.dataset.pose_table import PoseTable
@@ -33,7 +34,6 @@ from synfeal.dataset.sequence_listing import (
     RIGHT_COLOR,
     RIGHT_DEPTH,
 )
-from synfeal.dataset.sevenscenes import read_depth_m
 from synfeal.dataset.split_frames import SplitFrames, read_split_frames
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.limits import FARTHEST_M

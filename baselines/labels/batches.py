@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset import frame_files
+from synfeal.dataset import images
 from synfeal.dataset.frame_files import FrameFile, link_or_unpack
 from synfeal.dataset.pose_table import check_unit, whole_numbers
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 from synfeal.records.tables import read_numbers, write_numbers
+
+COLLECT_AGAIN = "; collect the data set again"
 
 
 @dataclass(frozen=True)
@@ -131,18 +133,11 @@ def read_image(path: FrameFile, camera: CameraConfig, mode: str | None = None) -
     Raises:
         InputError: it is missing, cannot be read, or has another size.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: no such image; collect the data set again")
-    pixels = np.asarray(frame_files.read_image(path, mode))
-    if pixels.shape[:2] != (camera.height, camera.width):
-        raise InputError(
-            f"{path}: is {pixels.shape[1]}x{pixels.shape[0]}, the camera has"
-            f" {camera.width}x{camera.height}; collect the data set again"
-        )
-    return pixels
+    size = (camera.width, camera.height)
+    return np.asarray(images.read_image(path, mode, size=size, remedy=COLLECT_AGAIN))
 
 
-def link_images(color_paths: Sequence[FrameFile], camera: CameraConfig, images: Path) -> None:
+def link_images(color_paths: Sequence[FrameFile], camera: CameraConfig, directory: Path) -> None:
     """Link frames into a new directory, under names that sort in the order of the frames.
 
     Each image is read first: COLMAP silently leaves out one that it cannot read, which would then
@@ -151,12 +146,12 @@ def link_images(color_paths: Sequence[FrameFile], camera: CameraConfig, images: 
     Args:
         color_paths: Colour images in order; those in an archive are unpacked instead of linked.
         camera: Camera whose size they must have.
-        images: Directory to create; it must not exist yet.
+        directory: Directory to create; it must not exist yet.
 
     Raises:
         InputError: as :func:`read_image`.
     """
-    images.mkdir()
+    directory.mkdir()
     for frame, path in enumerate(color_paths):
         read_image(path, camera)
-        link_or_unpack(path, images / f"{frame:06d}{path.suffix}")
+        link_or_unpack(path, directory / f"{frame:06d}{path.suffix}")

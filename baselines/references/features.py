@@ -24,8 +24,9 @@ from baselines.references.arrays import ByFrame, Stored
 from baselines.references.costs import write_costs
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import FrameFile
-from synfeal.dataset.sevenscenes import frames_between, read_depth_m
+from synfeal.dataset.sevenscenes import frames_between
 from synfeal.records.timing import Facts, timed
 from synfeal.render.base import Depth
 

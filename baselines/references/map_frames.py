@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from synfeal.camera.projection import pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.types import Positive, Strict
+from synfeal.dataset.depth import Depth
 from synfeal.dataset.finish import MANIFEST
 from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.images import image_size
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
 from synfeal.dataset.sevenscenes import read_split
 from synfeal.dataset.world import read_sequence_from_world
@@ -21,7 +23,6 @@ from synfeal.geometry.axes import PosesAre, meant_poses
 from synfeal.mesh.load import UpAxis
 from synfeal.records.files import read_json
 from synfeal.scanning.camera import CameraOptions, RgbdCamera, posed_depth, rgbd_camera
-from synfeal.scanning.reading import Depth, image_size, read_color, read_depth_m
 from synfeal.validation.depth_agreement import PosedDepth
 
 Array = NDArray[np.float64]
@@ -82,7 +83,7 @@ class MapFrames:
         Raises:
             InputError: It cannot be read or has not the size of its camera.
         """
-        return read_color(self.color[index], (self.camera.width, self.camera.height))
+        return self.rgbd.read_color(self.color[index])
 
     def read_depth_m(self, index: int) -> Depth:
         """Read a depth image (H, W) in metres, 0 where nothing was measured.
@@ -90,8 +91,7 @@ class MapFrames:
         Raises:
             InputError: It cannot be read or has not the size of its camera.
         """
-        size = (self.rgbd.depth.width, self.rgbd.depth.height)
-        return read_depth_m(self.depth[index], self.rgbd.depth_units_per_m, size)
+        return self.rgbd.read_depth_m(self.depth[index])
 
     def depth_at(self, depth_m: Depth, slope: Array) -> Array:
         """Look up how far away things are that the colour camera sees.

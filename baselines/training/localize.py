@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import torch
 from numpy.typing import NDArray
-from PIL import Image, ImageOps
+from PIL import Image
 from torch import Tensor
 
 from baselines.training.checkpoint import ModelDescription, TrainedLocalizer, read_checkpoint
@@ -25,11 +25,11 @@ from baselines.training.typicality import OUTSIDE, features_of, typicality
 from baselines.training.virtual_views import VirtualViews
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.photograph import PhotographCamera, Source
-from synfeal.dataset.frame_files import IMAGE_DAMAGE, opened_image
+from synfeal.dataset.images import read_image, upright
 from synfeal.dataset.packed import NetworkView, fit_frame
 from synfeal.dataset.pose_table import COLUMNS, SEEN
 from synfeal.dataset.render_sequence import Progress
-from synfeal.errors import InputError, why
+from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 from synfeal.records.files import writing_to
 from synfeal.records.tables import write_frame
@@ -292,7 +292,7 @@ def _write(
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
 # Modes of eight bits or fewer per channel; what else there is has no scale that is known.
-MODES = ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "CMYK", "YCbCr")
+LEAVE_OUT = "; leave it out or repair it"
 # A longer picture has no square with as much to see as a training frame has.
 MAX_ASPECT = 20
 
@@ -339,21 +339,15 @@ def open_picture(path: Path) -> Image.Image:
     Raises:
         InputError: The file is damaged, or is no picture of eight bits per channel.
     """
-    try:
-        with opened_image(path.read_bytes(), ("PNG", "JPEG"), MOST_PIXELS) as image:
-            if image.mode not in MODES:
-                problem = f"holds pixels of mode {image.mode}, such as depth, not 8-bit colours"
-            elif max(image.size) > MAX_ASPECT * min(image.size):
-                size = f"{image.width} x {image.height}"
-                problem = f"is {size} pixels, too long for a square to be cut out"
-            else:
-                upright = ImageOps.exif_transpose(image)
-                if "transparency" in upright.info:  # a palette's: Pillow knows this way only
-                    upright = upright.convert("RGBA")
-                return upright.convert("RGB")
-    except IMAGE_DAMAGE as error:
-        problem = f"cannot be read as a PNG or JPEG picture ({why(error)})"
-    raise InputError(f"{path}: {problem}; leave it out or repair it")
+    image = read_image(
+        path, "RGB", formats=("PNG", "JPEG"), most_pixels=MOST_PIXELS, remedy=LEAVE_OUT
+    )
+    if max(image.size) > MAX_ASPECT * min(image.size):
+        raise InputError(
+            f"{path}: is {image.width} x {image.height} pixels, too long for a square to be cut"
+            f" out{LEAVE_OUT}"
+        )
+    return upright(image)
 
 
 class PictureReader:

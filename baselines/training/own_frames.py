@@ -25,8 +25,10 @@ from baselines.training.resample import Resampler, same_view
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import MILLIMETRES
 from synfeal.dataset.finish import MANIFEST
-from synfeal.dataset.frame_files import FrameFile, read_image
+from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.images import image_size, read_image
 from synfeal.dataset.packed import fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
@@ -36,8 +38,7 @@ from synfeal.dataset.world import read_sequence_from_world
 from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import file_sha256, read_json, write_json
-from synfeal.scanning.camera import MILLIMETRES, TUM_UNITS_PER_M, RgbdCamera, posed_depth
-from synfeal.scanning.reading import image_size
+from synfeal.scanning.camera import TUM_UNITS_PER_M, RgbdCamera, posed_depth
 from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.depth_agreement import check_depth
 

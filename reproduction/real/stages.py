@@ -30,7 +30,8 @@ from reproduction.real.split import (
 )
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.finish import MANIFEST
-from synfeal.dataset.frame_files import FrameFile, read_image
+from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.images import read_image
 from synfeal.dataset.packed import fit_frame
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.posed_sequence import PosedFrames, read_posed_sequence

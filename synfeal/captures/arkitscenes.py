@@ -18,7 +18,8 @@ from synfeal.captures.capture import (
     resized,
 )
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import depth_reader, read_photograph, size_of_image
+from synfeal.captures.images import depth_reader, read_photograph
+from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import interpolate, inverse, pose_matrix
 
@@ -128,7 +129,7 @@ def _frame(
         camera=camera,
         world_from_cam=pose,
         read_depth_m=depth_reader(depth, MILLIMETRES, confidence),
-        depth_camera=resized(camera, *size_of_image(depth)) if depth else None,
+        depth_camera=resized(camera, *image_size(depth)) if depth else None,
         time_s=time_s,
         color_file=photograph,
     )

@@ -17,7 +17,9 @@ from synfeal.captures.capture import (
     rigid_pose,
 )
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import depth_reader, read_photograph, size_of_image
+from synfeal.captures.images import depth_reader, read_photograph
+from synfeal.dataset.depth import MILLIMETRES
+from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import inverse
 from synfeal.records.files import lies_in
@@ -25,7 +27,6 @@ from synfeal.records.files import lies_in
 MODELS = ("", "sparse/0", "sparse", "colmap/sparse/0", "model")
 IMAGES = ("images", "rgb", "", "../images", "../../images")
 DEPTHS = ("depth", "depths", "stereo/depth_maps")
-MILLIMETRES = 1000.0
 
 
 def _model_of(path: Path) -> Path | None:
@@ -125,7 +126,7 @@ def _camera(camera: Any, place: str) -> Calibration:
 def _frame(
     path: Path, name: str, image: Any, photograph: Path, camera: Calibration
 ) -> CapturedFrame:
-    size = size_of_image(photograph)
+    size = image_size(photograph)
     if size != (camera.width, camera.height):
         camera = resized(camera, *size)
     depth = _depth_of(path, name)
@@ -136,7 +137,7 @@ def _frame(
         camera=camera,
         world_from_cam=np.asarray(inverse(pose)),
         read_depth_m=depth_reader(depth, MILLIMETRES),
-        depth_camera=resized(camera, *size_of_image(depth)) if depth else None,
+        depth_camera=resized(camera, *image_size(depth)) if depth else None,
         color_file=photograph,
     )
 

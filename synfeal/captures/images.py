@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -10,13 +9,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from synfeal.captures.capture import Colors, Depth
-from synfeal.dataset.frame_files import IMAGE_DAMAGE, FrameFile, opened_image, read_image
-from synfeal.errors import InputError, read_as
-
-INVALID_MM = 65535
+from synfeal.dataset.depth import read_depth_m
+from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.images import decode_image, read_image, read_rgb
+from synfeal.errors import InputError
 
 
 def read_photograph(path: Path, width: int, height: int) -> Colors:
@@ -25,29 +23,12 @@ def read_photograph(path: Path, width: int, height: int) -> Colors:
     Raises:
         InputError: It is missing, damaged, or not of this size.
     """
-    image = read_image(path, "RGB")
-    if image.size != (width, height):
-        raise InputError(
-            f"{path}: is of {image.width}x{image.height} pixels, its calibration of"
-            f" {width}x{height}; are both of one capture?"
-        )
-    return np.asarray(image)
+    return read_rgb(path, size=(width, height), remedy="; are both of one capture?")
 
 
 def decode_photograph(content: bytes, place: object) -> Colors:
     """Decode a photograph (H, W, 3) from a file's bytes."""
-    with read_as(place, "an image", *IMAGE_DAMAGE), opened_image(content) as image:
-        return np.asarray(image.convert("RGB"))
-
-
-def size_of_image(path: Path) -> tuple[int, int]:
-    """Read the width and height of an image, pixels, without decoding it."""
-    with (
-        read_as(path, "an image", *IMAGE_DAMAGE),
-        path.open("rb") as file,
-        Image.open(io.BytesIO(file.read(2**20))) as image,
-    ):
-        return int(image.width), int(image.height)
+    return np.asarray(decode_image(content, place, "RGB"))
 
 
 def read_depth_png(
@@ -64,11 +45,7 @@ def read_depth_png(
     Returns:
         Depth (H, W) in metres along the optical axis, 0 where nothing was measured.
     """
-    values = np.asarray(read_image(path))
-    if values.ndim != 2 or values.dtype == np.uint8:
-        raise InputError(f"{path}: must be a 16-bit grey image of depth")
-    depth_m = (values / np.float32(units_per_m)).astype(np.float32)
-    depth_m[(values <= 0) | (values >= INVALID_MM)] = 0.0
+    depth_m = read_depth_m(path, units_per_m=units_per_m, nothing=0.0)
     if confidence is None:
         return depth_m
     return confident(depth_m, np.asarray(read_image(confidence)), least, confidence)

@@ -16,7 +16,8 @@ from synfeal.captures.capture import (
     rigid_pose,
 )
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import depth_reader, existing, read_photograph, size_of_image
+from synfeal.captures.images import depth_reader, existing, read_photograph
+from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 from synfeal.records.files import read_json
 
@@ -66,7 +67,7 @@ def _frame(folder: Path, file: Path, photograph: Path) -> CapturedFrame:
         camera = calibration(int(values["width"]), int(values["height"]), pinhole, file)
     depth = existing(folder / "depth" / f"{file.stem}.png")
     confidence = folder / "confidence" / f"{file.stem}.png"
-    size = size_of_image(photograph)
+    size = image_size(photograph)
     if size != (camera.width, camera.height):
         camera = resized(camera, *size)
     return CapturedFrame(
@@ -75,7 +76,7 @@ def _frame(folder: Path, file: Path, photograph: Path) -> CapturedFrame:
         camera=camera,
         world_from_cam=rigid_pose(matrix, file) @ GL_FROM_CAM,
         read_depth_m=depth_reader(depth, MILLIMETRES, existing(confidence), LEAST_CONFIDENCE),
-        depth_camera=resized(camera, *size_of_image(depth)) if depth else None,
+        depth_camera=resized(camera, *image_size(depth)) if depth else None,
         time_s=int(file.stem) / 1e6 if file.stem.isdecimal() else None,
         color_file=photograph,
     )

@@ -17,7 +17,8 @@ from synfeal.captures.capture import (
     rigid_pose,
 )
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import depth_reader, existing, read_photograph, size_of_image
+from synfeal.captures.images import depth_reader, existing, read_photograph
+from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 from synfeal.records.files import read_json
 
@@ -59,7 +60,7 @@ def _frame(path: Path, number: str, file: Path, photograph: Path) -> CapturedFra
         matrix = np.array(values["cameraPoseARFrame"], np.float64).reshape(4, 4)
         intrinsics = np.array(values["intrinsics"], np.float64).reshape(3, 3)
         time_s = None if values.get("time") is None else float(values["time"])
-    size = size_of_image(photograph)
+    size = image_size(photograph)
     pinhole = intrinsics[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     camera = calibration(*size, pinhole, file)
     depth = existing(path / f"depth_{number}.png")
@@ -70,7 +71,7 @@ def _frame(path: Path, number: str, file: Path, photograph: Path) -> CapturedFra
         camera=camera,
         world_from_cam=rigid_pose(matrix, file) @ GL_FROM_CAM,
         read_depth_m=depth_reader(depth, MILLIMETRES, existing(confidence)),
-        depth_camera=resized(camera, *size_of_image(depth)) if depth else None,
+        depth_camera=resized(camera, *image_size(depth)) if depth else None,
         time_s=time_s,
         color_file=photograph,
     )

@@ -16,11 +16,11 @@ from synfeal.captures.capture import (
     rigid_pose,
 )
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import read_depth_png, read_photograph, size_of_image
+from synfeal.captures.images import read_depth_png, read_photograph
+from synfeal.dataset.depth import MILLIMETRES
+from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import inverse
-
-MILLIMETRES = 1000.0
 
 
 def _is_at(path: Path) -> bool:
@@ -39,7 +39,7 @@ def _read(path: Path) -> Capture:
     stems = sorted(photographs.keys() & poses.keys(), key=int)
     if not stems:
         raise InputError(f"{path}: no file of color has one of the same number in pose")
-    size = size_of_image(photographs[stems[0]])
+    size = image_size(photographs[stems[0]])
     color_matrix = _matrix(path / "intrinsic" / "intrinsic_color.txt")
     pinhole = color_matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     camera = calibration(*size, pinhole, path / "intrinsic", centre_of_first_pixel=0.0)
@@ -49,7 +49,7 @@ def _read(path: Path) -> Capture:
     if with_depth:
         depth_matrix = _matrix(path / "intrinsic" / "intrinsic_depth.txt")
         pinhole = depth_matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
-        depth_size = size_of_image(depth_files[stems[0]])
+        depth_size = image_size(depth_files[stems[0]])
         depth_camera = calibration(
             *depth_size, pinhole, path / "intrinsic", centre_of_first_pixel=0.0
         )

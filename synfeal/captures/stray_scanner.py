@@ -17,11 +17,12 @@ from synfeal.captures.capture import (
     resized,
 )
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import depth_reader, existing, size_of_image
+from synfeal.captures.images import depth_reader, existing
 from synfeal.captures.video import Video
+from synfeal.dataset.depth import MILLIMETRES
+from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 
-MILLIMETRES = 1000.0
 POSE = ["x", "y", "z", "qx", "qy", "qz", "qw"]
 PINHOLE = ["fx", "fy", "cx", "cy"]
 
@@ -83,7 +84,7 @@ def _frame(
             [entry[name] for name in POSE[:3]], [entry[name] for name in POSE[3:]], place
         ),
         read_depth_m=depth_reader(depth, MILLIMETRES, existing(confidence)),
-        depth_camera=resized(camera, *size_of_image(depth)) if depth else None,
+        depth_camera=resized(camera, *image_size(depth)) if depth else None,
         time_s=entry["timestamp"],
     )
 

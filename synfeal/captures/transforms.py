@@ -18,7 +18,8 @@ from synfeal.captures.capture import (
     rigid_pose,
 )
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import depth_reader, read_photograph, size_of_image
+from synfeal.captures.images import depth_reader, read_photograph
+from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 from synfeal.records.files import lies_in, read_json
 
@@ -92,7 +93,7 @@ def _frame(
     units_per_m: float,
     place: str,
 ) -> CapturedFrame:
-    size = size_of_image(photograph)
+    size = image_size(photograph)
     camera = _camera({**values, **entry}, size, place)
     pose = rigid_pose(entry.get("transform_matrix"), f"{place}.transform_matrix") @ GL_FROM_CAM
     depth_file, depth_camera = None, None
@@ -100,7 +101,7 @@ def _frame(
         depth_file = _image_at(file, entry["depth_file_path"], f"{place}.depth_file_path")
         if depth_file is None:
             raise InputError(f"{place}.depth_file_path: {entry['depth_file_path']} is missing")
-        depth_camera = resized(camera, *size_of_image(depth_file))
+        depth_camera = resized(camera, *image_size(depth_file))
     return CapturedFrame(
         name=str(photograph.relative_to(file.parent)),
         read_color=partial_read(read_photograph, photograph, *size),

@@ -8,7 +8,8 @@ from pathlib import Path
 from synfeal.camera.sensors import SENSORS
 from synfeal.captures.capture import Capture, CapturedFrame, partial_read
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import depth_reader, read_photograph, size_of_image
+from synfeal.captures.images import depth_reader, read_photograph
+from synfeal.dataset.images import image_size
 from synfeal.dataset.posed_sequence import is_tum, read_posed_sequence
 from synfeal.errors import InputError
 
@@ -32,7 +33,7 @@ def _read(path: Path) -> Capture:
     sensor = SENSORS[name]
     first = listed.color[0]
     assert isinstance(first, Path)
-    if (size := size_of_image(first)) != (sensor.color.width, sensor.color.height):
+    if (size := image_size(first)) != (sensor.color.width, sensor.color.height):
         raise InputError(
             f"{first}: is of {size[0]}x{size[1]} pixels and nothing in the sequence says what its"
             " camera is; scan it with --color-camera FILE"

@@ -14,10 +14,8 @@ in tens of thousands of frames, gave other bytes for the same pixels.
 
 from __future__ import annotations
 
-import io
 import os
 import struct
-import warnings
 import zipfile
 import zlib
 from collections import Counter
@@ -31,9 +29,8 @@ from pathlib import Path, PurePath
 import deflate
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
-from synfeal.errors import read_as, why
+from synfeal.errors import why
 from synfeal.records.files import atomic_path
 
 SUFFIX = ".zip"
@@ -192,17 +189,6 @@ GREY, RGB = 0, 2  # colour types of the format
 FILTER_UP = 2  # each byte is stored as its difference from the byte above
 LEVEL = 1
 
-# What Pillow raises on damaged files, decompression bombs included.
-IMAGE_DAMAGE = (
-    OSError,
-    SyntaxError,
-    ValueError,
-    EOFError,
-    struct.error,
-    MemoryError,
-    Image.DecompressionBombError,
-)
-
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
@@ -270,33 +256,3 @@ def decode_png(content: bytes) -> Pixels | None:
     if channels == 3:
         return plain.reshape(height, width, 3)
     return plain.view(">u2").astype(np.uint16)
-
-
-@contextmanager
-def opened_image(
-    content: bytes, formats: tuple[str, ...] | None = None, most_pixels: int = MOST_PIXELS
-) -> Iterator[Image.Image]:
-    """Open an image without decoding it.
-
-    Args:
-        content: The file's bytes.
-        formats: Names of the formats that Pillow tries, such as ``PNG``; None tries all.
-        most_pixels: Largest width times height.
-
-    Raises:
-        ValueError: The image claims more pixels; no memory is taken for them.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our bound is lower
-        image = Image.open(io.BytesIO(content), formats=formats)
-    with image:
-        if image.width * image.height > most_pixels:
-            raise ValueError(f"{image.width} x {image.height} pixels are too many; make it smaller")
-        yield image
-
-
-def read_image(path: FrameFile, mode: str | None = None) -> Image.Image:
-    """Read and decode an image, converted to ``mode`` if one is given."""
-    with read_as(path, "an image", *IMAGE_DAMAGE), opened_image(path.read_bytes()) as image:
-        image.load()
-        return image.convert(mode) if mode else image.copy()

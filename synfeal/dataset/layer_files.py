@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.frame_files import FrameFile, read_image
+from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.images import read_image
 from synfeal.effects.scene import placed_objects
 from synfeal.errors import InputError, read_as
 from synfeal.mesh.instances import Instance, number_instances

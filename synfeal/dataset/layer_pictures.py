@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from synfeal.dataset.frame_files import FrameFile, read_image
+from synfeal.dataset.depth import read_depth_m
+from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.images import read_image
 from synfeal.dataset.layer_files import read_mask
 from synfeal.dataset.sequence_listing import COLOR, DEPTH, MASK, NORMAL, RIGHT_COLOR, RIGHT_DEPTH
-from synfeal.dataset.sevenscenes import read_depth_m
 
 GOLDEN_RATIO = 0.618034  # neighbours in number get hues far apart
 

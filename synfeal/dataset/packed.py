@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
-from synfeal.dataset.frame_files import read_image
+from synfeal.dataset.images import read_image
 from synfeal.dataset.sevenscenes import frames_between
 from synfeal.errors import InputError, read_as
 from synfeal.records.files import atomic_path, file_sha256, read_json, write_json

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 from PIL import Image, ImageDraw
 
-from synfeal.dataset.frame_files import FrameFile, read_image
+from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.images import read_image
 from synfeal.dataset.layer_pictures import PICTURES
 from synfeal.dataset.sequence_listing import SequenceListing
 from synfeal.dataset.sevenscenes import Split

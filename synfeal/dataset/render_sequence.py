@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
+from synfeal.dataset.depth import depth_mm_of
 from synfeal.dataset.frame_files import encode_png, is_archive, write_archive
 from synfeal.dataset.layer_files import mask_pixels, normal_pixels
 from synfeal.dataset.packed import NetworkView, fit_frame, new_packed
@@ -32,7 +33,7 @@ from synfeal.dataset.sequence_listing import (
     RIGHT_COLOR,
     RIGHT_DEPTH,
 )
-from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
+from synfeal.dataset.sevenscenes import pose_text
 from synfeal.effects.apply import Frame, varied_frames
 from synfeal.effects.scene import SceneRenderer, open_scene
 from synfeal.geometry.poses import moved_right

@@ -17,30 +17,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.frame_files import FrameFile, frame_file, read_image, sequence_at
+from synfeal.dataset.frame_files import FrameFile, frame_file, sequence_at
 from synfeal.dataset.sequence_listing import gap_in, list_sequence
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.limits import FARTHEST_M
 from synfeal.records.files import atomic_path
 
-INVALID_MM = 65535
 SEQUENCE = re.compile(r"(sequence)?[0-9]{1,9}")
 SPLIT_FILES = {"train": "TrainSplit.txt", "test": "TestSplit.txt"}
-
-
-def depth_mm_of(depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Convert depth (H, W) in metres to millimetres; 65535 beyond 65.534 m and for nothing hit."""
-    depth_mm = np.round(np.asarray(depth_m, np.float64) * 1000.0)
-    return np.minimum(depth_mm, INVALID_MM).astype(np.uint16)
-
-
-def read_depth_m(path: FrameFile) -> NDArray[np.float32]:
-    """Read a 16-bit depth image (H, W) as metres along the optical axis, inf where invalid."""
-    depth_mm = np.asarray(read_image(path))
-    if depth_mm.ndim != 2 or depth_mm.dtype == np.uint8:
-        raise InputError(f"{path}: must be a 16-bit grey image, millimetres")
-    depth_m = (depth_mm / 1000.0).astype(np.float32)
-    return np.where(depth_mm >= INVALID_MM, np.float32(np.inf), depth_m)
 
 
 def pose_text(world_from_cam: NDArray[np.float64]) -> str:

@@ -26,15 +26,14 @@ from synfeal.camera.projection import (
     pixels_of_points,
 )
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
-from synfeal.dataset.sevenscenes import INVALID_MM
 from synfeal.errors import InputError, read_as
 from synfeal.evaluation.bootstrap import medians
 from synfeal.evaluation.metrics import Metrics, draws, is_pose, means, with_limits
 from synfeal.geometry.poses import relative
 from synfeal.records.files import atomic_path
-from synfeal.validation.listing import read_depth_mm
 
 if TYPE_CHECKING:
     from synfeal.mesh.rays import RayCaster
@@ -45,6 +44,7 @@ CELLS = (8, 6)  # columns, rows
 # RIO10 prints the share of frames with a DCRE below these.
 DCRE_BOUNDS = (0.05, 0.15)
 BLOCK = 2000  # frames at once: bounds memory
+OTHER_CAMERA = "; give the camera of these images with --camera"
 
 
 def _directions(camera: CameraConfig) -> Array:
@@ -151,11 +151,8 @@ def depth_of_images(paths: Iterable[FrameFile], camera: CameraConfig) -> Iterato
     """Yield depths (48,) at the centres of the cells from depth images of the camera's size."""
     column, row = cell_pixels(camera, *CELLS).reshape(-1, 2).astype(int).T
     for path in paths:
-        depth_mm = read_depth_mm(path)
-        if depth_mm.shape != (camera.height, camera.width):
-            raise InputError(f"{path}: is not {camera.width} x {camera.height}; give --camera")
-        values = depth_mm[row, column]
-        yield np.where((values > 0) & (values < INVALID_MM), values / 1000.0, np.inf)
+        depth_m = read_depth_m(path, size=(camera.width, camera.height), remedy=OTHER_CAMERA)
+        yield depth_m[row, column].astype(np.float64)
 
 
 def write_scene_depth(collision: Path, plan: Path, camera: CameraConfig, out_depth: Path) -> None:

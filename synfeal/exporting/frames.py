@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import is_measured, read_depth_units
 from synfeal.dataset.frame_files import FrameFile, encode_png
-from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
+from synfeal.dataset.images import image_size
+from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.errors import InputError
 from synfeal.geometry.poses import moved_right
 from synfeal.validation.camera import camera_of_dataset
@@ -28,8 +30,6 @@ from synfeal.validation.listing import (
     Frame,
     frames_of,
     list_sequences,
-    read_color,
-    read_depth_mm,
 )
 from synfeal.validation.manifest import check_splits, read_splits
 from synfeal.validation.poses import check_rigid, check_tables, rigid_bound
@@ -125,7 +125,7 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
             )
             for left in frames
         )
-    height, width = read_color(frames[0].color).shape[:2]
+    width, height = image_size(frames[0].color)
     if (width, height) != (camera.config.width, camera.config.height):
         raise InputError(
             f"{frames[0].color}: is {width} x {height}, the camera is {camera.config.width} x"
@@ -175,8 +175,8 @@ def rewrite_depth(source: FrameFile, target: Path, units_per_m: int = 1000) -> f
     Returns:
         Share of the known depths that are beyond 65535 units.
     """
-    depth_mm = read_depth_mm(source)
-    known = (depth_mm > 0) & (depth_mm < INVALID_MM)
+    depth_mm = read_depth_units(source)
+    known = is_measured(depth_mm)
     units = np.round(depth_mm.astype(np.float64) * (units_per_m / 1000.0))
     fits = known & (units <= 65535)
     target.parent.mkdir(parents=True, exist_ok=True)

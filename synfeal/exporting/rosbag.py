@@ -19,11 +19,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from synfeal.dataset.sevenscenes import INVALID_MM, SPLIT_FILES
+from synfeal.dataset.depth import is_measured, read_depth_units
+from synfeal.dataset.images import read_rgb
+from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.errors import InputError
 from synfeal.exporting.frames import ExportFrame, ExportSet, Place, need_perspective
 from synfeal.geometry.poses import quat_wxyz_of
-from synfeal.validation.listing import read_color, read_depth_mm
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -81,11 +82,11 @@ def _messages(data: ExportSet, store: Typestore, frame: ExportFrame, time_ns: in
     optical = types["std_msgs/msg/Header"](stamp=stamp, frame_id=CAMERA)
     in_world = types["std_msgs/msg/Header"](stamp=stamp, frame_id=WORLD)
     info = _camera_info(data, store, optical)
-    yield f"{COLOR}/image_raw", _image(store, optical, read_color(frame.color), "rgb8")
+    yield f"{COLOR}/image_raw", _image(store, optical, read_rgb(frame.color), "rgb8")
     yield f"{COLOR}/camera_info", info
     if data.has_depth:
-        depth_mm = read_depth_mm(frame.depth)
-        known_mm = np.where(depth_mm == INVALID_MM, 0, depth_mm).astype(np.uint16)
+        depth_mm = read_depth_units(frame.depth)
+        known_mm = np.where(is_measured(depth_mm), depth_mm, np.uint16(0))
         yield f"{DEPTH}/image_raw", _image(store, optical, known_mm, "16UC1")
         yield f"{DEPTH}/camera_info", info
     yield from _poses(store, frame, in_world)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from synfeal.config.collection import Box, CollectionConfig, SceneConfig
 from synfeal.config.dataset import CameraConfig, RenderConfig, Shade
 from synfeal.config.options import SCENE, TEST_PATHS
+from synfeal.dataset.images import is_of_one_color
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.sevenscenes import Split
 from synfeal.errors import InputError
@@ -30,7 +31,6 @@ from synfeal.planning.coverage import MOSTLY, empty_shares
 from synfeal.planning.plan import box_array, plan_split
 from synfeal.records.provenance import generator_of
 from synfeal.render import open_renderer
-from synfeal.validation.frames import is_of_one_color
 
 Array = NDArray[np.float64]
 

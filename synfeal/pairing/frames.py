@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.errors import InputError
 from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.depth_agreement import PosedDepth
 from synfeal.validation.frames import check_names, kinds_of, read_poses
-from synfeal.validation.listing import COLOR, DEPTH, Frame, list_sequences, read_depth_mm
+from synfeal.validation.listing import COLOR, DEPTH, Frame, list_sequences
 from synfeal.validation.manifest import check_splits, read_splits
 from synfeal.validation.poses import check_rigid, rigid_bound
 
@@ -65,16 +66,11 @@ class DepthFrames:
         Raises:
             InputError: The image is missing, damaged, or of another size than the camera.
         """
-        path = self.frames[index].path(DEPTH)
-        depth_mm = read_depth_mm(path)
-        height, width = depth_mm.shape
-        if (width, height) != (self.camera.width, self.camera.height):
-            raise InputError(
-                f"{path}: is {width} x {height}, the camera {self.camera.width} x"
-                f" {self.camera.height}; give the camera of these images with --camera"
-            )
-        known = (depth_mm > 0) & (depth_mm < 65535)
-        return np.where(known, depth_mm.astype(np.float32) / 1000.0, np.float32(np.inf))
+        return read_depth_m(
+            self.frames[index].path(DEPTH),
+            size=(self.camera.width, self.camera.height),
+            remedy="; give the camera of these images with --camera",
+        )
 
 
 def read_depth_frames(

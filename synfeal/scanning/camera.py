@@ -14,16 +14,18 @@ from scipy.spatial.transform import Rotation
 
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
+from synfeal.dataset.depth import MILLIMETRES, Depth, read_depth_m
 from synfeal.dataset.finish import MANIFEST
+from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.images import read_rgb
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import pose_matrix
 from synfeal.records.files import read_json
-from synfeal.scanning.reading import read_depth_m
 from synfeal.validation.depth_agreement import PosedDepth
 
 Array = NDArray[np.float64]
-MILLIMETRES, TUM_UNITS_PER_M = 1000.0, 5000.0  # what a metre of depth is stored as
+TUM_UNITS_PER_M = 5000.0  # what the TUM benchmark stores a metre of depth as
 MOST_ASIDE_M = 10.0  # of the depth camera from the colour camera
 
 
@@ -50,6 +52,27 @@ class RgbdCamera:
     depth_from_color: Array
     depth_units_per_m: float = MILLIMETRES
     source: str = ""
+
+    def read_color(self, path: FrameFile, shrink: int = 1) -> NDArray[np.uint8]:
+        """Read a photograph (H, W, 3).
+
+        Args:
+            path: Image file.
+            shrink: Factor by which both sides are made shorter, averaging pixels.
+
+        Raises:
+            InputError: It cannot be read or is of another size than the camera.
+        """
+        return read_rgb(path, size=(self.color.width, self.color.height), shrink=shrink)
+
+    def read_depth_m(self, path: FrameFile) -> Depth:
+        """Read a depth image (H, W) in metres, 0 where nothing was measured.
+
+        Raises:
+            InputError: It cannot be read or is of another size than the camera.
+        """
+        size = (self.depth.width, self.depth.height)
+        return read_depth_m(path, units_per_m=self.depth_units_per_m, nothing=0.0, size=size)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -129,10 +152,9 @@ def posed_depth(frames: PosedFrames, camera: RgbdCamera, options: frozenset[str]
         options: Options that remedies may name, see :class:`PosedDepth`.
     """
     files = [file for file in frames.depth if file is not None]
-    size = (camera.depth.width, camera.depth.height)
     return PosedDepth(
         files=files,
-        read_m=lambda index: read_depth_m(files[index], camera.depth_units_per_m, size),
+        read_m=lambda index: camera.read_depth_m(files[index]),
         world_from_cam=frames.world_from_cam,
         camera=camera.depth,
         depth_from_cam=camera.depth_from_color,

@@ -19,7 +19,6 @@ from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.scanning.camera import RgbdCamera
 from synfeal.scanning.fusion import FusedSurface
-from synfeal.scanning.reading import read_color, read_depth_m
 from synfeal.scanning.seen import project, sampled, seen_points, within
 
 MARGIN_PX = 2.0
@@ -49,21 +48,19 @@ def colors_of(
     points, normals = surface.vertices_m.astype(np.float32), surface.normals.astype(np.float32)
     total = np.zeros((len(points), 3), np.float32)
     weight = np.zeros(len(points), np.float32)
-    color_size = (camera.color.width, camera.color.height)
-    depth_size = (camera.depth.width, camera.depth.height)
     color_from_depth = inverse(camera.depth_from_color)
     turn, shift = (part.astype(np.float32) for part in np.split(color_from_depth[:3], [3], axis=1))
     for index, world_from_color in enumerate(frames.world_from_cam):
         depth_file = frames.depth[index]
         assert depth_file is not None
-        depth_m = read_depth_m(depth_file, camera.depth_units_per_m, depth_size)
+        depth_m = camera.read_depth_m(depth_file)
         seen = seen_points(
             points, normals, depth_m, camera.depth, world_from_color @ color_from_depth
         )
         local = seen.in_depth_cam_m @ turn.T + shift[:, 0]
         pixel = project(local, camera.color)
         inside = within(pixel, camera.color.width, camera.color.height, MARGIN_PX)
-        image = read_color(frames.color[index], color_size)
+        image = camera.read_color(frames.color[index])
         share = (seen.cosine / local[:, 2]) ** 2
         vertex = seen.index[inside]
         total[vertex] += sampled(image, pixel[inside]) * share[inside, None]

@@ -26,7 +26,6 @@ from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.geometry.poses import inverse
 from synfeal.scanning.camera import RgbdCamera
 from synfeal.scanning.fusion import FusedSurface
-from synfeal.scanning.reading import read_color, read_depth_m
 from synfeal.scanning.seen import Floats, project, sampled, seen_points, within
 from synfeal.validation.depth_agreement import spread
 
@@ -114,15 +113,13 @@ def sightings_of(
     for index in spread(len(frames), N_FRAMES):
         file = frames.depth[index]
         assert file is not None
-        size = (camera.depth.width, camera.depth.height)
-        depth_m = read_depth_m(file, camera.depth_units_per_m, size)
+        depth_m = camera.read_depth_m(file)
         pose = frames.world_from_cam[index] @ color_from_depth
         seen = seen_points(points, normals, depth_m, camera.depth, pose)
         moved = seen.in_depth_cam_m @ color_from_depth[:3, :3].T + color_from_depth[:3, 3]
         vertex.append(seen.index)
         local.append(moved.astype(np.float32))
-        size = (camera.color.width, camera.color.height)
-        rgb = read_color(frames.color[index], size, SHRINK).astype(np.float32)
+        rgb = camera.read_color(frames.color[index], SHRINK).astype(np.float32)
         photographs.append((rgb @ LUMA)[..., None])
         on_frame()
     return Sightings(np.concatenate(vertex), tuple(local), tuple(photographs), count)

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from synfeal.camera.projection import normalised_of_pixels, pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import Depth
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.scanning.camera import RgbdCamera
-from synfeal.scanning.reading import Depth, read_depth_m
 
 Array = NDArray[np.float64]
 # Voxels per edge of a block, blocks to begin with (more are added), truncation in voxels, and how
@@ -106,11 +106,10 @@ def fuse(
     # Open3D cuts projected positions to whole pixels: with the centre of the first pixel at
     # (0.5, 0.5) that is the nearest one.
     matrix = o3d.core.Tensor.from_numpy(camera.depth.intrinsics.matrix())
-    size = (camera.depth.width, camera.depth.height)
     color_from_depth = inverse(camera.depth_from_color)
     for file, world_from_color in zip(frames.depth, frames.world_from_cam, strict=True):
         assert file is not None
-        depth_m = flatten(read_depth_m(file, camera.depth_units_per_m, size))
+        depth_m = flatten(camera.read_depth_m(file))
         if ((depth_m > 0) & (depth_m < max_depth_m)).any():
             image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(depth_m[..., None]))
             cam_from_world = o3d.core.Tensor.from_numpy(

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
+from synfeal.dataset.images import read_rgb
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.mesh.model import TexturedMesh
 from synfeal.records.files import atomic_path
 from synfeal.render.choose import open_renderer
 from synfeal.scanning.consistency import LUMA, shrunk
-from synfeal.scanning.reading import read_color
 
 Rgb = NDArray[np.uint8]
 SHRINK = 2
@@ -71,7 +71,8 @@ def compare(
     with open_renderer(mesh, small, RenderConfig()) as renderer:
         for name, file, pose in zip(frames.names, frames.color, world_from_cam, strict=True):
             rgb, depth_m = renderer.render_rgbd(pose)
-            photograph = read_color(file, (camera.width, camera.height), SHRINK)
+            size = (camera.width, camera.height)
+            photograph = read_rgb(file, size=size, shrink=SHRINK)
             photograph = photograph[: small.height, : small.width]
             found.append(Comparison(name, photograph, rgb, np.isfinite(depth_m)))
             on_frame()

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from synfeal.camera.distortion import distort
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import Depth
 from synfeal.geometry.poses import inverse
-from synfeal.scanning.reading import Depth
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

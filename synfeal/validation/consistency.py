@@ -18,6 +18,8 @@ from scipy.ndimage import map_coordinates
 
 from synfeal.camera.projection import horizontal_fov_rad, normalised_of_pixels, pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import read_depth_m
+from synfeal.dataset.images import read_rgb
 from synfeal.errors import InputError
 from synfeal.geometry.poses import moved_right, pose_error
 from synfeal.validation.camera import KnownCamera, Lens, lens_of
@@ -25,12 +27,11 @@ from synfeal.validation.frames import Poses
 from synfeal.validation.listing import (
     COLOR,
     DEPTH,
+    PNG,
     RIGHT_COLOR,
     RIGHT_DEPTH,
     Check,
     Frame,
-    read_color,
-    read_depth_mm,
 )
 from synfeal.validation.poses import GAPS
 from synfeal.validation.reprojection import ComparedFrame, Residual, camera_normal, compare
@@ -195,18 +196,16 @@ def _view(
     Colours are those of the pixels of depth, whichever camera took them.
     """
     try:
-        depth_mm = read_depth_mm(frame.path(depth))
-        grey = read_color(frame.path(color)).astype(np.float32) @ LUMA
+        depth_m = read_depth_m(frame.path(depth))
+        grey = read_rgb(frame.path(color), formats=PNG).astype(np.float32) @ LUMA
     except InputError:
         return None
     if grey.shape != (camera.config.height, camera.config.width):
         return None
-    if depth_mm.shape != (camera.depth.height, camera.depth.width):
+    if depth_m.shape != (camera.depth.height, camera.depth.width):
         return None
     if camera.of_depth is not None:
         grey = _registered(grey, camera.config, camera.of_depth)
-    known = (depth_mm > 0) & (depth_mm < 65535)
-    depth_m = np.where(known, depth_mm.astype(np.float32) / 1000.0, np.float32(np.inf))
     return ComparedFrame(world_from_cam, depth_m, grey)
 
 

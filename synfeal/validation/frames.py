@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import DepthUnits, is_measured, read_depth_units
 from synfeal.dataset.frame_files import FrameFile, foreign_members, is_archive
+from synfeal.dataset.images import LOOKED_AT, is_of_one_color, read_rgb
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError
 from synfeal.validation.listing import (
@@ -17,23 +21,19 @@ from synfeal.validation.listing import (
     DEPTH,
     MASK,
     NORMAL,
+    PNG,
     POSE,
     RIGHT_COLOR,
     RIGHT_DEPTH,
     Check,
     Frame,
-    Pixels,
     SequenceListing,
     frames_of,
-    read_color,
-    read_depth_mm,
 )
 
 Poses = dict[Frame, NDArray[np.float64]]
+Pixels = NDArray[Any]
 
-EVERY = 4  # rows and columns that are looked at for what is blank
-SAME = 2  # grey levels
-ONE_COLOR = 0.95  # of a frame's pixels
 # Share of the frames: a camera may come close to a plain wall, and rooms without a ceiling have
 # empty frames, of which collect says how many.
 ONE_COLOR_FRAMES, EMPTY_FRAMES = "of one colour", "more than half empty"
@@ -93,11 +93,12 @@ def check_images(
         on_frame: Called after each frame.
     """
     size = (camera.width, camera.height) if camera else None
+    read_color = partial(read_rgb, formats=PNG)
     readers: dict[str, Callable[[FrameFile], Pixels]] = {
         COLOR: read_color,
-        DEPTH: read_depth_mm,
+        DEPTH: read_depth_units,
         RIGHT_COLOR: read_color,
-        RIGHT_DEPTH: read_depth_mm,
+        RIGHT_DEPTH: read_depth_units,
     }
     failures: list[str] = []
     blank: dict[str, list[Frame]] = {what: [] for what in MOST}
@@ -138,10 +139,10 @@ def check_images(
     return [Check("images", text, tuple(failures)), _content(n_frames, blank)]
 
 
-def _median_m(depth_mm: Pixels) -> float:
+def _median_m(depth_mm: DepthUnits) -> float:
     """Return the median of the known depths, metres; infinite where there are none."""
-    depth_mm = depth_mm[::EVERY, ::EVERY]
-    known = depth_mm[(depth_mm > 0) & (depth_mm < 65535)]
+    depth_mm = depth_mm[::LOOKED_AT, ::LOOKED_AT]
+    known = depth_mm[is_measured(depth_mm)]
     return float(np.median(known)) / 1000.0 if known.size else math.inf
 
 
@@ -158,17 +159,10 @@ def _content(n_frames: int, blank: Mapping[str, list[Frame]]) -> Check:
     return Check("content", f"of {n_frames} frames {', '.join(said)}", tuple(failures))
 
 
-def is_of_one_color(rgb: Pixels) -> bool:
-    """Check whether nearly all pixels of an image (H, W, 3) have about the same colour."""
-    rgb = rgb[::EVERY, ::EVERY]
-    usual = np.median(rgb.reshape(-1, 3), axis=0)
-    return bool(np.mean((np.abs(rgb - usual) <= SAME).all(axis=2)) >= ONE_COLOR)
-
-
-def _is_mostly_empty(rgb: Pixels, depth_mm: Pixels | None) -> bool:
+def _is_mostly_empty(rgb: Pixels, depth_mm: DepthUnits | None) -> bool:
     """Tell whether most of an image shows nothing; without depth, black counts as empty."""
-    black = (rgb[::EVERY, ::EVERY] == 0).all(axis=2)
-    empty = black if depth_mm is None else (depth_mm == 0) | (depth_mm == 65535)
+    black = (rgb[::LOOKED_AT, ::LOOKED_AT] == 0).all(axis=2)
+    empty = black if depth_mm is None else ~is_measured(depth_mm)
     return bool(np.mean(empty) > 0.5)
 
 

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from synfeal.camera.projection import cell_directions
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import read_depth_m
+from synfeal.dataset.images import read_rgb
 from synfeal.dataset.layer_files import (
     MASKS,
     MIDDLE,
@@ -30,11 +32,10 @@ from synfeal.validation.listing import (
     DEPTH,
     MASK,
     NORMAL,
+    PNG,
     Check,
     Frame,
     SequenceListing,
-    read_color,
-    read_depth_mm,
 )
 
 MOST_COMPARED = 60  # frames whose normals are compared with depth
@@ -91,7 +92,7 @@ def _check_normals(
         on_frame()
         path = frame.path(NORMAL)
         try:
-            pixels = read_color(path)
+            pixels = read_rgb(path, formats=PNG)
         except InputError as error:
             failures.append(str(error))
             continue
@@ -132,12 +133,11 @@ def _check_normals(
 def _angle_to_depth_deg(normals: Array, frame: Frame, rays: Array) -> float | None:
     """Return the median angle between normals of cells and of depth; None if little is seen."""
     try:
-        depth_mm = read_depth_mm(frame.path(DEPTH))
+        depth_m = read_depth_m(frame.path(DEPTH), nothing=np.nan)
     except InputError:
         return None  # the check of images says so
-    if depth_mm.shape != normals.shape[:2]:
+    if depth_m.shape != normals.shape[:2]:
         return None
-    depth_m = np.where((depth_mm > 0) & (depth_mm < 65535), depth_mm / 1000.0, np.nan)
     points = depth_m[..., None] * rays
     reach = max(1, depth_m.shape[1] // 80)  # differences over many pixels drown the rounding
     along_x = points[reach:-reach, 2 * reach :] - points[reach:-reach, : -2 * reach]
@@ -208,9 +208,9 @@ def _mask_failures(
     if len(unknown):
         return [f"{path}: shows instance {unknown[0]}, which {MASKS} does not list"]
     if has_depth:
-        depth_mm = read_depth_mm(frame.path(DEPTH))
-        if depth_mm.shape == ids.shape:
-            apart = float(np.mean((ids == 0) != (depth_mm == 65535)))
+        depth_m = read_depth_m(frame.path(DEPTH))
+        if depth_m.shape == ids.shape:
+            apart = float(np.mean((ids == 0) != np.isinf(depth_m)))
             if apart > MOST_APART:
                 return [
                     f"{path}: differs from the depth image in where there is anything, in"

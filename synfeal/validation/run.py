@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.dataset.depth import read_depth_m
 from synfeal.errors import InputError
 from synfeal.records.progress import Progress
 from synfeal.validation.camera import KnownCamera, camera_of_dataset
@@ -25,7 +26,6 @@ from synfeal.validation.listing import (
     SequenceListing,
     frames_of,
     list_sequences,
-    read_depth_mm,
 )
 from synfeal.validation.manifest import (
     check_manifest,
@@ -144,7 +144,7 @@ def _convention(rigid: Poses, camera: KnownCamera) -> Check:
     size = (camera.depth.width, camera.depth.height)
 
     def read_m(index: int) -> NDArray[np.float32]:
-        return measured_m(read_depth_mm(frames[index].path(DEPTH)), size)
+        return read_depth_m(frames[index].path(DEPTH), nothing=0.0, size=size)
 
     try:
         found = compare_depth(
@@ -166,17 +166,6 @@ def _convention(rigid: Poses, camera: KnownCamera) -> Check:
         said = f"{text}; not judged, the camera is assumed"
         return Check("convention", said, skipped=True)
     return Check("convention", text, failures)
-
-
-def measured_m(depth_mm: NDArray[np.uint16], size: tuple[int, int]) -> NDArray[np.float32]:
-    """Return depth (H, W) in metres, 0 for nothing.
-
-    Raises:
-        InputError: It is not of ``size``, width and height.
-    """
-    if depth_mm.shape[::-1] != size:
-        raise InputError("a depth image is of another size than its camera")
-    return np.where(depth_mm < 65535, depth_mm / np.float32(1000.0), np.float32(0.0))
 
 
 def report(dataset: Path, checks: Sequence[Check]) -> str:

@@ -16,10 +16,11 @@ from baselines.labels.batches import link_images
 from baselines.labels.rgbd.frames import frame_generator
 from synfeal.cli import main
 from synfeal.dataset import frame_files as archive_module
+from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import ArchivedFile, foreign_members, frame_file, write_archive
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.render_sequence import write_sequence
-from synfeal.dataset.sevenscenes import frame_paths, read_depth_m, read_pose, read_split
+from synfeal.dataset.sevenscenes import frame_paths, read_pose, read_split
 from synfeal.render.surface import Layers
 from tests.support.collected import collect, tree_of
 from tests.support.damaged_sets import CAMERA

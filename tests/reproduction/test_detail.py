@@ -14,9 +14,9 @@ import trimesh
 from synfeal.collection.detail import choose_detail, middle_of, write_detail
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
+from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.dataset.render_sequence import render_packed, render_sequence
-from synfeal.dataset.sevenscenes import read_depth_m
 from synfeal.effects.scene import open_scene
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
 from synfeal.mesh.model import MeshPart, TexturedMesh

@@ -29,6 +29,8 @@ from reproduction.statistics.limits import combine, read_metrics
 from reproduction.tables.assistance import assistance_record
 from synfeal.camera.calibration import read_calibration
 from synfeal.config.dataset import CameraConfig, RenderConfig
+from synfeal.dataset.depth import read_depth_units
+from synfeal.dataset.images import read_rgb
 from synfeal.dataset.packed import pack_frames, read_packed
 from synfeal.dataset.packed import write_packed as write_joined
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
@@ -39,7 +41,6 @@ from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.planning.repeat import read_poses
 from synfeal.records.files import write_json
 from synfeal.validation.camera import camera_of_dataset
-from synfeal.validation.listing import read_color, read_depth_mm
 from synfeal.validation.run import validate
 from tests.support import mesh_samples as meshes
 from tests.support.colored_frames import save, untrained
@@ -204,13 +205,13 @@ KINDS = (
     Kind("pose", POSE, WRITE_POSE, read_pose, lambda p: bool(np.isfinite(p).all()), "\t"),
     Kind("split", "TrainSplit.txt", text("sequence1\nsequence2\n"),
          lambda p: read_split(p.parent, "train"), form="e"),
-    Kind("colour image", COLOR, write_color, read_color, lambda rgb: rgb.ndim == 3),
+    Kind("colour image", COLOR, write_color, read_rgb, lambda rgb: rgb.ndim == 3),
     Kind("colour image, packed", COLOR, write_color, elsewhere(packed), is_packed),
     Kind("colour image, SfM", COLOR, write_color,
          elsewhere(lambda p, out: batches.link_images([p], CAMERA, out / "images"))),
     Kind("colour image, odometry", COLOR, write_color,
          lambda p: batches.read_image(p, CAMERA, "RGB"), lambda rgb: rgb.shape == (18, 24, 3)),
-    Kind("depth image", DEPTH, write_depth, read_depth_mm, lambda mm: mm.dtype == np.uint16),
+    Kind("depth image", DEPTH, write_depth, read_depth_units, lambda mm: mm.dtype == np.uint16),
     Kind("packed frames", "train.npy", write_packed, read_packed, is_packed, n_flips=60),
     Kind("packed frames, training", "train.npy", write_packed, lambda p: read_images(p, N, 8, CPU)),
     Kind("record of packed frames", "seq-01.json", write_record, elsewhere(recorded),

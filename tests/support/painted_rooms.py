@@ -5,8 +5,9 @@ import numpy as np
 from PIL import Image
 
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import depth_mm_of
 from synfeal.dataset.frame_files import encode_png
-from synfeal.dataset.sevenscenes import depth_mm_of, pose_text
+from synfeal.dataset.sevenscenes import pose_text
 from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.records.files import write_json

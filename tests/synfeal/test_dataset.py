@@ -15,6 +15,7 @@ from synfeal.collection.prepare import prepare_scene
 from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset import sevenscenes
+from synfeal.dataset.depth import depth_mm_of, read_depth_m
 from synfeal.dataset.finish import write_manifest
 from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
@@ -85,10 +86,10 @@ def test_split_files_are_those_of_7_scenes(tmp_path):
 
 def test_depth_is_16_bit_millimetres_and_a_pose_four_exact_rows(tmp_path):
     depth = np.array([[0.5, 1.2344, np.inf], [65.534, 65.536, 100.0]], np.float32)
-    (tmp_path / "depth.png").write_bytes(encode_png(sevenscenes.depth_mm_of(depth)))
+    (tmp_path / "depth.png").write_bytes(encode_png(depth_mm_of(depth)))
     stored = np.asarray(Image.open(tmp_path / "depth.png"))
     assert stored.tolist() == [[500, 1234, 65535], [65534, 65535, 65535]]
-    back = sevenscenes.read_depth_m(tmp_path / "depth.png")
+    back = read_depth_m(tmp_path / "depth.png")
     np.testing.assert_allclose(back[0, :2], [0.5, 1.234], atol=1e-6)
     assert np.isinf(back[[0, 1, 1], [2, 1, 2]]).all()
     pose = poses_of(1).world_from_cam[0]
@@ -112,7 +113,7 @@ def test_rendered_sequence_holds_what_the_poses_see(tmp_path):
         np.testing.assert_allclose(
             sevenscenes.read_pose(path), poses.world_from_cam[index], atol=1e-9
         )
-    centre = sevenscenes.read_depth_m(directory / "frame-000002.depth.png")[15, 20]
+    centre = read_depth_m(directory / "frame-000002.depth.png")[15, 20]
     origin, forward = poses.position_m[2], poses.world_from_cam[2, :3, 2]
     wall = np.min((2.0 - np.sign(forward) * origin) / np.abs(forward))  # the box is 4 m wide
     assert centre == pytest.approx(wall, abs=0.05)

@@ -12,13 +12,12 @@ from PIL import Image
 
 from baselines.references.arrays import read_arrays
 from baselines.training.localize import open_picture
-from synfeal.dataset.frame_files import read_image
+from synfeal.dataset.images import image_size, read_image
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.errors import InputError
 from synfeal.mesh import claims
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.materials import MAX_SIDE_PX
-from synfeal.validation.listing import read_color
 from tests.support.fuzzing import little_memory
 from tests.support.mesh_samples import TRIANGLE, textured, triangle_gltf, write_gltf, write_obj
 
@@ -190,7 +189,7 @@ def test_a_texture_that_claims_too_much_is_left_out(write, tmp_path, caplog):
     assert f"at most {MAX_SIDE_PX} pixels" in caplog.text
 
 
-@pytest.mark.parametrize("read", [read_color, read_image, open_picture])
+@pytest.mark.parametrize("read", [read_image, image_size, open_picture])
 def test_an_image_that_claims_too_much_is_refused_without_a_warning(read, tmp_path):
     """Python warns of images a little smaller than those that Pillow itself refuses."""
     path = tmp_path / "frame.png"

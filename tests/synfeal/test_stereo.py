@@ -13,6 +13,7 @@ import synfeal
 from synfeal.cli import main
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import encode_png
+from synfeal.dataset.images import read_rgb
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.preview import TILE_WIDTH_PX
 from synfeal.dataset.render_sequence import write_sequence
@@ -24,7 +25,6 @@ from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.render.surface import Layers
-from synfeal.validation.listing import read_color
 from tests.support.collected import collect, refused, save_room
 from tests.support.small_room import facing_quad, furnished_room, paint
 
@@ -66,8 +66,8 @@ def test_a_plane_is_moved_by_whole_pixels_as_its_disparity_says(tmp_path):
         write_sequence(
             renderer, table, tmp_path / "seq-01", Layers(depth=True), stereo_baseline_m=0.1
         )
-    left = read_color(tmp_path / "seq-01/frame-000000.color.png").astype(int)
-    right = read_color(tmp_path / "seq-01/frame-000000.right.color.png").astype(int)
+    left = read_rgb(tmp_path / "seq-01/frame-000000.color.png").astype(int)
+    right = read_rgb(tmp_path / "seq-01/frame-000000.right.color.png").astype(int)
     assert left.std() > 10
     assert np.abs(right[:, :-5] - left[:, 5:]).max() <= 2
     assert np.abs(right[:, :-4] - left[:, 4:]).mean() > 2

@@ -17,10 +17,10 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from baselines.config.labels import DepthConfig
-from baselines.labels.batches import read_image
+from baselines.labels.batches import COLLECT_AGAIN, read_image
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import FrameFile
-from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
 from synfeal.records.provenance import generator_of
 
@@ -161,7 +161,6 @@ def motion_or_none(estimate: Callable[[], o3d.core.Tensor]) -> Array | None:
 
 
 # Depth images hold millimetres; 0 and 65535 mean that nothing was hit.
-_INVALID_MM = (0, 65535)
 
 
 @dataclass(frozen=True)
@@ -208,11 +207,8 @@ def read_frame(
         InputError: an image cannot be read, has another size than the camera, or the depth is not
             16-bit.
     """
-    color, depth_mm = read_image(color_path, camera, "RGB"), read_image(depth_path, camera)
-    if depth_mm.ndim != 2 or depth_mm.dtype not in (np.uint16, np.int32):
-        raise InputError(f"{depth_path}: is not a 16-bit depth image; collect the data set again")
-    invalid = (depth_mm == _INVALID_MM[0]) | (depth_mm == _INVALID_MM[1])
-    depth_m = np.where(invalid, np.float32(np.inf), depth_mm.astype(np.float32) / np.float32(1000))
+    color = read_image(color_path, camera, "RGB")
+    depth_m = read_depth_m(depth_path, size=(camera.width, camera.height), remedy=COLLECT_AGAIN)
     if cfg.sensor == "kinect":
         depth_m = kinect_depth(depth_m, frame_generator(seed, depth_path))
     depth_m = np.where(depth_m > cfg.max_depth_m, np.float32(np.inf), depth_m)

@@ -1,0 +1,232 @@
+"""Images of frames and photographs: the one reader of them.
+
+Pixels are taken as they are stored, because poses and calibrations are of the stored pixels. A
+camera that was held upright may have stored them lying and noted the turn in EXIF:
+:func:`orientation_of` reports it, :func:`upright` follows it.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import ExifTags, Image, ImageOps
+
+from synfeal.dataset.frame_files import MOST_PIXELS, FrameFile, decode_png
+from synfeal.errors import InputError, read_as
+
+# Modes of Pillow that hold colours of eight bits per channel, or fewer.
+EIGHT_BIT = ("1", "L", "LA", "La", "P", "PA", "RGB", "RGBA", "RGBX", "RGBa", "CMYK", "YCbCr", "LAB")
+# What Pillow raises on damaged files, decompression bombs included.
+IMAGE_DAMAGE = (
+    OSError,
+    SyntaxError,
+    ValueError,
+    EOFError,
+    struct.error,
+    MemoryError,
+    Image.DecompressionBombError,
+)
+# A frame of nearly one colour: every so many rows and columns are looked at, and so many of their
+# pixels are within so many grey levels of the median.
+LOOKED_AT, SAME, ONE_COLOR = 4, 2, 0.95
+
+
+class Orientation(IntEnum):
+    """EXIF's orientation: how stored pixels are to be turned to stand upright.
+
+    Source: JEITA CP-3451 (Exif 2.32), tag 0x0112. Turns are clockwise.
+    """
+
+    UPRIGHT = 1
+    MIRRORED = 2
+    TURNED_180 = 3
+    MIRRORED_TURNED_180 = 4
+    MIRRORED_TURNED_270 = 5
+    TURNED_90 = 6
+    MIRRORED_TURNED_90 = 7
+    TURNED_270 = 8
+
+
+def read_image(
+    path: FrameFile,
+    mode: str | None = None,
+    *,
+    size: tuple[int, int] | None = None,
+    formats: tuple[str, ...] | None = None,
+    most_pixels: int = MOST_PIXELS,
+    remedy: str = "",
+) -> Image.Image:
+    """Read and decode an image, verifying the checksums of a PNG.
+
+    Args:
+        path: Image file, on its own or inside an archive.
+        mode: Pillow mode to convert to: ``RGB`` or ``L``, which only images of eight bits per
+            channel can be converted to; None keeps the file's own.
+        size: Width and height that it must have, pixels.
+        formats: Names of the formats that are read, such as ``PNG``; None reads all of Pillow's.
+        most_pixels: Largest width times height; no memory is taken for more.
+        remedy: Advice at the end of messages ("; collect the data set again").
+
+    Returns:
+        The image as it is stored, with its EXIF data.
+
+    Raises:
+        InputError: It is missing, damaged, in another format, or of another size or kind.
+    """
+    content = _content(path, remedy)
+    return decode_image(
+        content, path, mode, size=size, formats=formats, most_pixels=most_pixels, remedy=remedy
+    )
+
+
+def decode_image(
+    content: bytes,
+    place: object,
+    mode: str | None = None,
+    *,
+    size: tuple[int, int] | None = None,
+    formats: tuple[str, ...] | None = None,
+    most_pixels: int = MOST_PIXELS,
+    remedy: str = "",
+) -> Image.Image:
+    """Decode the bytes of an image; ``place`` names it in messages, see :func:`read_image`."""
+    image = _decoded(content, place, formats, most_pixels, remedy)
+    if size is not None and image.size != size:
+        raise InputError(
+            f"{place}: is of {image.width} x {image.height} pixels, the camera of {size[0]} x"
+            f" {size[1]}{remedy or '; all images of a camera must be of its size'}"
+        )
+    if mode is None or mode == image.mode:
+        return image
+    if image.mode not in EIGHT_BIT:
+        raise InputError(
+            f"{place}: holds pixels of mode {image.mode}, such as depth, not 8-bit colours{remedy}"
+        )
+    if "transparency" in image.info:  # a palette's: Pillow knows this way only
+        image = image.convert("RGBA")
+    return image.convert(mode)
+
+
+def read_rgb(
+    path: FrameFile,
+    *,
+    size: tuple[int, int] | None = None,
+    shrink: int = 1,
+    formats: tuple[str, ...] | None = None,
+    remedy: str = "",
+) -> NDArray[np.uint8]:
+    """Read the colours (H, W, 3) of an image.
+
+    Args:
+        path: Image file.
+        size: Width and height that it must have, pixels.
+        shrink: Factor by which both sides are then made shorter, averaging pixels.
+        formats: Names of the formats that are read, such as ``PNG``; None reads all of Pillow's.
+        remedy: Advice at the end of messages.
+
+    Raises:
+        InputError: See :func:`read_image`.
+    """
+    image = read_image(path, "RGB", size=size, formats=formats, remedy=remedy)
+    return np.asarray(image.reduce(shrink) if shrink > 1 else image)
+
+
+def image_size(path: FrameFile) -> tuple[int, int]:
+    """Read the width and height of an image, pixels, without decoding it.
+
+    Raises:
+        InputError: It is missing or no image.
+    """
+    with (
+        read_as(path, "an image", *IMAGE_DAMAGE),
+        _opened(path) as file,
+        opened_image(file) as image,
+    ):
+        return image.size
+
+
+def orientation_of(image: Image.Image) -> Orientation:
+    """Return how EXIF says the pixels of an image are turned; upright where it says nothing."""
+    try:
+        return Orientation(image.getexif().get(ExifTags.Base.Orientation, 1))
+    except ValueError:  # numbers and text that the standard does not know
+        return Orientation.UPRIGHT
+
+
+def upright(image: Image.Image) -> Image.Image:
+    """Turn an image as its EXIF orientation says."""
+    if orientation_of(image) is Orientation.UPRIGHT:
+        return image
+    return ImageOps.exif_transpose(image)
+
+
+def is_of_one_color(rgb: NDArray[np.uint8]) -> bool:
+    """Check whether nearly all pixels of an image (H, W, 3) have about the same colour."""
+    rgb = rgb[::LOOKED_AT, ::LOOKED_AT]
+    usual = np.median(rgb.reshape(-1, 3), axis=0)
+    return bool(np.mean((np.abs(rgb - usual) <= SAME).all(axis=2)) >= ONE_COLOR)
+
+
+@contextmanager
+def opened_image(
+    file: IO[bytes], formats: tuple[str, ...] | None = None, most_pixels: int = MOST_PIXELS
+) -> Iterator[Image.Image]:
+    """Open an image without decoding it.
+
+    Args:
+        file: The file, open.
+        formats: Names of the formats that Pillow tries, such as ``PNG``; None tries all.
+        most_pixels: Largest width times height.
+
+    Raises:
+        ValueError: The image claims more pixels; no memory is taken for them.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our bound is lower
+        image = Image.open(file, formats=formats)
+    with image:
+        if image.width * image.height > most_pixels:
+            raise ValueError(f"{image.width} x {image.height} pixels are too many; make it smaller")
+        yield image
+
+
+def _opened(path: FrameFile) -> IO[bytes]:
+    """Open a file, of which its beginning may be all that is read."""
+    if isinstance(path, Path) and path.is_file():
+        return path.open("rb")
+    return io.BytesIO(_content(path))
+
+
+def _content(path: FrameFile, remedy: str = "") -> bytes:
+    with read_as(path, "an image", OSError, remedy=remedy):
+        try:
+            return path.read_bytes()
+        except FileNotFoundError as error:
+            raise InputError(f"{path}: missing{remedy}") from error
+
+
+def _decoded(
+    content: bytes, place: object, formats: tuple[str, ...] | None, most_pixels: int, remedy: str
+) -> Image.Image:
+    """Decode every row; our own PNG files by the fast codec."""
+    if formats is None or "PNG" in formats:
+        pixels = decode_png(content)
+        if pixels is not None and pixels.shape[0] * pixels.shape[1] <= most_pixels:
+            return Image.fromarray(pixels)
+    with read_as(place, "an image", *IMAGE_DAMAGE, remedy=remedy):
+        with opened_image(io.BytesIO(content), formats, most_pixels) as image:
+            is_png = image.format == "PNG"
+            if is_png:
+                image.verify()  # after which it has to be opened anew
+        with opened_image(io.BytesIO(content), formats, most_pixels) as image:
+            image.load()
+            return image.copy()

@@ -1,0 +1,65 @@
+"""The one reader of depth images: units, what is no measurement, and what is no depth image."""
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from synfeal.dataset.depth import depth_mm_of, is_measured, read_depth_m, read_depth_units
+from synfeal.dataset.frame_files import encode_png
+from synfeal.errors import InputError
+
+STORED = np.array([[0, 1, 1234], [5000, 65534, 65535]], np.uint16)
+
+
+@pytest.fixture(params=["ours", "opencv"])
+def path(request, tmp_path):
+    """An image of ``STORED``, by our codec and by OpenCV."""
+    file = tmp_path / "frame-000000.depth.png"
+    if request.param == "ours":
+        file.write_bytes(encode_png(STORED))
+    else:
+        assert cv2.imwrite(str(file), STORED)
+    return file
+
+
+def test_units_are_those_of_the_file(path):
+    assert np.array_equal(read_depth_units(path), STORED)
+
+
+@pytest.mark.parametrize(("units_per_m", "one_m"), [(1000.0, 1.234), (5000.0, 0.2468)])
+@pytest.mark.parametrize("nothing", [np.inf, 0.0])
+def test_depth_is_in_metres_and_neither_0_nor_65535_is_measured(path, units_per_m, one_m, nothing):
+    depth_m = read_depth_m(path, units_per_m=units_per_m, nothing=nothing)
+    assert depth_m.dtype == np.float32
+    assert depth_m[0, 2] == np.float32(one_m)
+    assert depth_m[0, 0] == depth_m[1, 2] == nothing
+    assert np.allclose(depth_m.flat[[1, 3, 4]], STORED.flat[[1, 3, 4]] / units_per_m)
+
+
+def test_every_millimetre_survives_a_round_trip(tmp_path):
+    every = np.arange(65536, dtype=np.uint16).reshape(256, 256)
+    (tmp_path / "depth.png").write_bytes(encode_png(every))
+    back = depth_mm_of(read_depth_m(tmp_path / "depth.png"))
+    assert np.array_equal(back[is_measured(every)], every[is_measured(every)])
+    assert (back[~is_measured(every)] == 65535).all()
+
+
+@pytest.mark.parametrize(
+    ("pixels", "line"),
+    [
+        (np.zeros((2, 3), np.uint8), "must be a 16-bit grey image of depth, not of mode L"),
+        (np.zeros((2, 3, 3), np.uint8), "must be a 16-bit grey image of depth, not of mode RGB"),
+        (np.zeros((3, 2), np.uint16), "is of 2 x 3 pixels, the camera of 3 x 2"),
+    ],
+)
+def test_other_images_are_refused_in_one_line(pixels, line, tmp_path):
+    path = tmp_path / "frame-000000.depth.png"
+    Image.fromarray(pixels).save(path)
+    with pytest.raises(InputError, match=rf"frame-000000\.depth\.png: {line}.*; measure again$"):
+        read_depth_m(path, size=(3, 2), remedy="; measure again")
+
+
+def test_a_missing_image_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"frame-000000\.depth\.png: missing$"):
+        read_depth_units(tmp_path / "frame-000000.depth.png")
