@@ -1,7 +1,7 @@
-"""Find declared methods in the source of this package and of those installed beside it.
+"""Find what is declared in the source of these packages and of those installed beside them.
 
-A package of one's own names its modules as entry points of the group ``synfeal.methods``; each
-module may declare any number of methods::
+A package of one's own names its modules as entry points of the group that the kind names, such as
+``synfeal.methods``; each module may declare any number of them::
 
     [project.entry-points."synfeal.methods"]
     direct = "my_package.direct"
@@ -16,14 +16,10 @@ from dataclasses import replace
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeGuard, TypeVar
 
 from baselines.registry.kinds import Kind
 from synfeal.errors import InputError
-
-ENTRY_POINTS = "synfeal.methods"
-PACKAGE = Path(__file__).parents[1]
-NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 K = TypeVar("K", bound=Kind)
 
@@ -42,8 +38,8 @@ def declared(kind: type[K]) -> dict[str, K]:
             literal, or a name is not allowed or taken.
     """
     found: dict[str, K] = {}
-    for module, source in (*_own(kind.room), *_installed()):
-        for declaration in _declarations(module, source):
+    for module, source in (*_own(kind.room), *_installed(kind.entry_points)):
+        for declaration in _declarations(module, source, kind.__name__):
             if not isinstance(declaration, kind):
                 continue
             other = found.get(declaration.name)
@@ -62,17 +58,23 @@ def _order(method: Kind) -> tuple[int, str]:
 
 @cache
 def _own(room: str) -> tuple[tuple[str, Path], ...]:
-    """List the modules of a folder of this package, each with its source."""
-    sources = sorted((PACKAGE / room).rglob("*.py"))
-    names = (".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts) for path in sources)
-    return tuple(zip(names, sources, strict=True))
+    """List the modules of a package, each with its source."""
+    spec = importlib.util.find_spec(room)
+    folders = spec.submodule_search_locations if spec else None
+    found = []
+    for folder in map(Path, folders or ()):
+        for source in sorted(folder.rglob("*.py")):
+            parts = source.relative_to(folder).with_suffix("").parts
+            found.append((".".join([room, *parts]), source))
+    return tuple(found)
 
 
 @cache
-def _installed() -> tuple[tuple[str, Path], ...]:
-    """List the modules that installed packages name, each with its source."""
+def _installed(group: str) -> tuple[tuple[str, Path], ...]:
+    """List the modules that installed packages name in a group, each with its source."""
     found = []
-    for entry in sorted(entry_points(group=ENTRY_POINTS), key=lambda entry: entry.name):
+    kinds = [name for name, kind in _kinds().items() if kind.entry_points == group]
+    for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
         try:
             spec = importlib.util.find_spec(entry.module)
         except ModuleNotFoundError:
@@ -80,31 +82,31 @@ def _installed() -> tuple[tuple[str, Path], ...]:
         if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
             raise InputError(
                 f"{entry.module}: the module of the entry point '{entry.name}' of"
-                f" {ENTRY_POINTS} is not there; install its package again, or remove it"
+                f" {group} is not there; install its package again, or remove it"
             )
         source = Path(spec.origin)
-        if not _declarations(entry.module, source):
+        if not any(_declarations(entry.module, source, kind) for kind in kinds):
             raise InputError(
-                f"{source}: declares no method, though the entry point '{entry.name}' of"
-                f" {ENTRY_POINTS} names it; see docs/adding.md"
+                f"{source}: declares nothing, though the entry point '{entry.name}' of"
+                f" {group} names it; see docs/adding.md"
             )
         found.append((entry.module, source))
     return tuple(found)
 
 
 @cache
-def _declarations(module: str, source: Path) -> tuple[Kind, ...]:
-    """Read the declarations of a module from its source."""
-    text = source.read_text(encoding="utf-8")
-    if not any(f"@{kind}(" in text or f".{kind}(" in text for kind in _kinds()):
+def _declarations(module: str, source: Path, name: str) -> tuple[Kind, ...]:
+    """Read the declarations of the kind with a name from the source of a module."""
+    text, kind = source.read_text(encoding="utf-8"), _kinds()[name]
+    if f"@{name}(" not in text and f".{name}(" not in text:
         return ()
     found = []
     for node in ast.parse(text, str(source)).body:
         if not isinstance(node, ast.ClassDef | ast.FunctionDef):
             continue
         for decorator in node.decorator_list:
-            declaration = _declaration(decorator, source)
-            if declaration is not None:
+            if _is_call_of(decorator, name):
+                declaration = _declaration(decorator, source, kind)
                 found.append(replace(declaration, place=f"{module}:{node.name}"))
     return tuple(found)
 
@@ -113,16 +115,17 @@ def _kinds() -> dict[str, type[Kind]]:
     return {kind.__name__: kind for kind in Kind.__subclasses__()}
 
 
-def _declaration(decorator: ast.expr, source: Path) -> Kind | None:
-    """Build what a decorator declares, or None where it is another decorator."""
+def _is_call_of(decorator: ast.expr, name: str) -> TypeGuard[ast.Call]:
+    """Tell whether a decorator calls what has this name, in whichever module."""
     if not isinstance(decorator, ast.Call):
-        return None
+        return False
     called = decorator.func
-    name = called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", "")
-    kind = _kinds().get(name)
-    if kind is None:
-        return None
-    where = f"{source}: line {decorator.lineno}: @{name}"
+    return name == (called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", ""))
+
+
+def _declaration(decorator: ast.Call, source: Path, kind: type[Kind]) -> Kind:
+    """Build what a decorator declares."""
+    where = f"{source}: line {decorator.lineno}: @{kind.__name__}"
     try:
         arguments = {str(each.arg): ast.literal_eval(each.value) for each in decorator.keywords}
     except ValueError as error:
@@ -133,8 +136,7 @@ def _declaration(decorator: ast.expr, source: Path) -> Kind | None:
         declaration = kind(**arguments)
     except TypeError as error:  # an argument is missing or unknown
         raise InputError(f"{where}: {str(error).partition('() ')[2]}") from error
-    if not NAME.fullmatch(declaration.name):
-        raise InputError(
-            f"{where}: name: '{declaration.name}' must be lower-case letters, digits and -"
-        )
+    pattern, allowed = kind.names
+    if not re.fullmatch(pattern, declaration.name):
+        raise InputError(f"{where}: name: '{declaration.name}' must be {allowed}")
     return declaration

@@ -30,10 +30,17 @@ class Kind:
         title: Name in tables and figures.
         rank: Place in tables and figures; those that are declared elsewhere come last.
         place: Place of the class or function, ``module:name``; filled in by the registry.
-        room: Folder of this package whose modules may declare methods of the kind.
+        room: Package whose modules may declare methods of the kind.
+        entry_points: Group of entry points by which other packages name modules that do.
+        names: Pattern of their names, and what it allows in words.
     """
 
     room: ClassVar[str]
+    entry_points: ClassVar[str] = "synfeal.methods"
+    names: ClassVar[tuple[str, str]] = (
+        "[a-z][a-z0-9-]*",
+        "lower-case letters, digits and -",
+    )
     name: str
     title: str
     rank: int = 1000
@@ -59,7 +66,7 @@ class LocalizerKind(Kind):
         style: Line in figures: ``color``, ``marker`` and ``linestyle`` of Matplotlib.
     """
 
-    room: ClassVar[str] = "localizers"
+    room: ClassVar[str] = "baselines.localizers"
     halve_every: tuple[int, int]
     backbone: Literal["resnet34"] | None = None
     hyper: str = "baselines.config.learning:LocalizerConfig"
@@ -80,7 +87,7 @@ class LabelMethod(Kind):
         published_assisted: Batches in which section 4.1 says that it needed assistance.
     """
 
-    room: ClassVar[str] = "labels"
+    room: ClassVar[str] = "baselines.labels"
     works_on: Literal["frames", "graph", "rule"]
     settings: str = ""
     unused: tuple[str, ...] = ()
@@ -96,7 +103,7 @@ class LabelError(Kind):
         turns: It turns cameras, too; without it ``noise_deg`` must be 0.
     """
 
-    room: ClassVar[str] = "labels"
+    room: ClassVar[str] = "baselines.labels"
     of_space: bool = False
     turns: bool = True
 
@@ -115,6 +122,6 @@ class ReferenceMethod(Kind):
             (retrieval and matching), ``views``.
     """
 
-    room: ClassVar[str] = "references"
+    room: ClassVar[str] = "baselines.references"
     group: Group
     query: tuple[str, ...] = ()

@@ -20,9 +20,10 @@ from reproduction.claims.labels import changes
 from reproduction.design.experiments import Design, Experiment
 from reproduction.design.shapes import SHAPES, shape_rows
 from reproduction.statistics.seeds import limits
-from reproduction.tables.columns import Column, SideTable, write_side
+from reproduction.tables.columns import Column, SideLayout
+from reproduction.tables.side import SideTable, Source, Table
 from synfeal.evaluation.bootstrap import Array, difference, mean_of
-from synfeal.records.tables import LIMITLESS_MAYBE, TEXT, frame_of, write_frame
+from synfeal.records.tables import LIMITLESS_MAYBE, TEXT, frame_of
 
 NAME = "shape_changes"
 ENDS = ("percent", "percent_low", "percent_high")
@@ -41,20 +42,6 @@ COLUMNS = (
     Column("Label errors", "title"),
     *(Column(f"{error.capitalize()} error", error, text=f"{error}_text") for error in QUANTITIES),
 )
-
-
-def write_shape_changes(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Compare equally large label errors of different shapes.
-
-    Args:
-        design: The profile's table of experiments, with rows for :func:`shape_rows`.
-        root: Results of the profile.
-        out_csv: CSV to write: two rows per shape, and two per pair of shapes.
-        out_tex: LaTeX to write: the same, a row per shape and pair.
-    """
-    table = shape_changes_table(design, root)
-    write_frame(out_csv, table, "%.4g")
-    write_side(out_tex, side_table(table))
 
 
 def shape_changes_table(design: Design, root: Path) -> pd.DataFrame:
@@ -96,7 +83,7 @@ def _records(evidence: Evidence, name: str, change: Array) -> list[dict[str, Any
     return records
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Lay out a row per shape and per pair of shapes, a column per error."""
     texts = table.assign(
         text=[
@@ -110,9 +97,28 @@ def side_table(table: pd.DataFrame) -> SideTable:
     for error in QUANTITIES:
         lines[error] = wide["percent", error].loc[names].astype(float).to_list()
         lines[f"{error}_text"] = wide["text", error].loc[names].str.replace("-", "−").to_list()
-    return SideTable(NAME, CAPTION, COLUMNS, lines, REMARK)
+    return SideLayout(NAME, CAPTION, COLUMNS, lines, REMARK)
 
 
 def _title(change: str) -> str:
     """Say which label errors a row is of."""
     return f"{change}: {SHAPES[change]}" if change in SHAPES else change
+
+
+@SideTable(
+    name="shape_changes",
+    title="Shape changes",
+    rank=80,
+    needs=("runs/{shape_run}/common_errors.csv", "labels/{true_set}/{split}.csv"),
+    in_document=True,
+)
+class ShapeChangesTable(Table):
+    """Two rows for each shape of label errors, and two for each pair of shapes."""
+
+    schema = SCHEMA
+    float_format = "%.4g"
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Compare equally large label errors of different shapes."""
+        return shape_changes_table(source.design, source.root)

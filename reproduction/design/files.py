@@ -16,10 +16,7 @@ from baselines.labels.methods import stages_of
 from baselines.localizers.registry import backbone_of
 from reproduction.config.profile import Config
 from reproduction.design.experiments import Design, Run, common_every, split_init
-from reproduction.design.ranking import ranked_sets, rankings
 from reproduction.design.references import DataSet, answered_by, data_sets, has_structure
-from reproduction.design.shapes import TABLE as SHAPE_TABLE
-from reproduction.design.shapes import shape_rows
 from synfeal.config.dataset import RenderConfig
 from synfeal.config.effects import CLEAN, MIXED, EffectsConfig
 from synfeal.dataset.frame_files import SUFFIX
@@ -82,28 +79,13 @@ class Files:
 
     @cached_property
     def tables(self) -> list[str]:
-        """The paper's tables, and ours of training runs."""
-        return ["table1_meshes", *self.design.tables]
+        """Tables of training runs, the paper's and ours."""
+        return self.design.tables
 
     @cached_property
     def drawn_tables(self) -> list[str]:
         """Those of them that figures are drawn from."""
         return [table for table in self.tables if table in DRAWN_TABLES]
-
-    @cached_property
-    def label_tables(self) -> tuple[str, ...]:
-        """Tables of estimated label sets; none where none is estimated."""
-        return ("assistance", "label_error") if self.design.estimated else ()
-
-    @cached_property
-    def ranking_tables(self) -> tuple[str, ...]:
-        """The table of how labels rank methods; none where all labels are exact."""
-        return ("label_ranking",) if ranked_sets(self.design) else ()
-
-    @cached_property
-    def shape_tables(self) -> tuple[str, ...]:
-        """The table that compares label errors by their shape; none where rows are missing."""
-        return ("shape_changes",) if shape_rows(self.design.rows) else ()
 
     @cached_property
     def backbones(self) -> list[str]:
@@ -261,11 +243,12 @@ class Files:
         folder = f"{self.root}/estimates/{scene}/{size}/{method}/{split}"
         return [f"{folder}/batch-{b.index:03d}.csv" for b in self.batches(scene, size, split)]
 
-    def batch_facts(self) -> list[str]:
-        """List records of all batches of the estimated label sets, stage by stage."""
+    @cached_property
+    def estimated_batches(self) -> list[str]:
+        """All batches of the estimated label sets, stage by stage, below ``estimates``."""
         return sorted(
             {
-                f"{self.root}/estimates/{scene}/{size}/{stage}/{split}/batch-{b.index:03d}.json"
+                f"{scene}/{size}/{stage}/{split}/batch-{b.index:03d}"
                 for scene, size, method in self.design.estimated
                 for stage in stages_of(method)
                 for split in SPLITS
@@ -329,12 +312,11 @@ class Files:
         rows, settings = self.design.rows, self.config.references
         return {key: answered_by(rows, key, settings) for key in data_sets(rows)}
 
-    def of_references(self, file: str) -> list[str]:
-        """List a file of every reference method and data set."""
+    @cached_property
+    def reference_answers(self) -> list[str]:
+        """Every reference method and data set, below ``references``."""
         return [
-            f"{self.root}/references/{'/'.join(key)}/{name}/{file}"
-            for key, names in self.references().items()
-            for name in names
+            f"{'/'.join(key)}/{name}" for key, names in self.references().items() for name in names
         ]
 
     def external_poses(self, name: str, data_set: Mapping[str, str]) -> str | None:
@@ -350,23 +332,6 @@ class Files:
     def reference_files(self, folder: str, names: Iterable[str]) -> list[str]:
         """List the files that reference methods write in the folder of one data set."""
         return [f"{folder}/{name}/{file}" for name in names for file in REFERENCE_FILES]
-
-    def ranked_predictions(self) -> list[str]:
-        """List predictions of the methods that labels rank."""
-        found = rankings(self.design, self.config.references)
-        folders = {folder for each in found for runs in each.folders.values() for folder in runs}
-        return [f"{self.root}/{folder}/predictions.csv" for folder in sorted(folders)]
-
-    def ranking_labels(self) -> list[str]:
-        """List test labels that rank them, and the true poses."""
-        sets = ranked_sets(self.design)
-        named = {"/".join(key) for key in sets} | {f"{s}/{size}/synfeal" for s, size, _ in sets}
-        return [f"{self.root}/labels/{name}/test.csv" for name in sorted(named)]
-
-    def compared_errors(self) -> list[str]:
-        """List errors on the common test frames that tell label errors apart by their shape."""
-        runs = self.runs_of(SHAPE_TABLE) if self.shape_tables else []
-        return [f"{self.root}/runs/{run}/common_errors.csv" for run in runs]
 
     # Robustness: test frames with effects
 
@@ -435,13 +400,8 @@ class Files:
         names = [CLEAN, *self.tested_effects] if self.has_robust_structure else []
         return [f"{self.root}/robustness/structure/{name}.csv" for name in names]
 
-    def robustness_tables(self, kind: str = "csv") -> list[str]:
-        """List the robustness table, where it has rows."""
-        return [f"{self.root}/tables/robustness.{kind}"] if self.has_robustness else []
-
-    def drawn_robustness(self) -> list[str]:
-        """List robustness files that figures and speeds read, where figures of runs are drawn."""
+    def effects_speed(self) -> list[str]:
+        """List the file of what effects cost, where figures of runs are drawn."""
         if not (self.has_robustness and self.drawn_tables):
             return []
-        speed = f"{self.root}/scenes/{self.config.robustness.scene}/effects_speed.csv"
-        return [speed, *self.robustness_tables()]
+        return [f"{self.root}/scenes/{self.config.robustness.scene}/effects_speed.csv"]

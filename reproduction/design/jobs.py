@@ -17,6 +17,7 @@ from baselines.registry.kinds import Group
 from reproduction.design.experiments import INJECTED
 from reproduction.design.files import SPLITS, Files
 from reproduction.design.references import DataSet
+from reproduction.design.side_tables import made_side_tables
 from synfeal.config.effects import CLEAN, MIXED
 
 # Wildcards of a job, by name.
@@ -33,17 +34,8 @@ MEASUREMENTS = {
     "posegraph": f"{{graph_method}}/{_BATCH}",
     "train": "train/{scene}/{size}/{labels}/{init}/{model}/seed{repetition}",
     "table": "tables/{table}",
-    "table1_meshes": "tables/table1_meshes",
-    "references_table": "tables/references",
-    "recall": "tables/recall",
-    "assistance": "tables/assistance",
-    "label_error": "tables/label_error",
-    "label_ranking": "tables/label_ranking",
-    "shape_changes": "tables/shape_changes",
-    "speed_vs_error": "tables/speed_vs_error",
-    "hard_cases": "tables/hard_cases",
+    "side_table": "tables/{side}",
     "document": "tables/document",
-    "robustness": "tables/robustness",
 }
 
 
@@ -238,29 +230,16 @@ def _robustness(files: Files) -> dict[str, list[Job]]:
         "train_varied": [{"model": model} for model in MODELS],
         "varied_descriptors": [{"trained_on": name} for name in (CLEAN, MIXED)],
         "varied_structure": [{"effects": name} for name in structure],
-        "effects_speed": [{}] if files.drawn_tables else [],
+        "effects_speed": [{} for _ in files.effects_speed()],
         "robustness": [{}],
     }
 
 
 def _evidence(files: Files) -> dict[str, list[Job]]:
-    once = (
-        "table1_meshes",
-        *files.label_tables,
-        *files.ranking_tables,
-        *files.shape_tables,
-        "recall",
-        "references_table",
-        "speed_vs_error",
-        "hard_cases",
-        "document",
-        "figures",
-        "summary",
-        "claims",
-    )
     return {
-        **{rule: [{}] for rule in once},
         "table": [{"table": table} for table in files.design.tables],
+        "side_table": [{"side": name} for name in made_side_tables(files)],
+        **{rule: [{}] for rule in ("document", "figures", "summary", "claims")},
     }
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import sys
-from pathlib import Path
 
 import pandas as pd
 
 from reproduction.hard_cases.cases import CASES, REFUSAL, examined
-from reproduction.tables.columns import Column, SideTable
-from synfeal.records.tables import COUNT, LIMITLESS, NUMBER, TEXT, frame_of, write_frame
+from reproduction.tables.columns import Column, SideLayout
+from reproduction.tables.side import SideTable, Source, Table
+from synfeal.records.tables import COUNT, LIMITLESS, NUMBER, TEXT, frame_of
 
 NAME = "hard_cases"
 SCHEMA = {
@@ -21,11 +21,6 @@ SCHEMA = {
     "ok": COUNT,
     "reference": TEXT,
 }
-
-
-def write_hard_cases(out_csv: Path) -> None:
-    """Run our functions on all cases and write one row for each; errors may be ``inf``."""
-    write_frame(out_csv, frame_of(examined(CASES), SCHEMA))
 
 
 COLUMNS = (
@@ -43,7 +38,7 @@ CAPTION = (
 REMARK = "None: no answer, or no number; cases without one right answer are to be refused."
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Lay out every case with both errors, the formulas that made them, and the bound."""
     unit = ", " + table.unit
     rows = table.assign(
@@ -57,7 +52,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
         rows[f"{which}_error"] = error.clip(upper=sys.float_info.max)  # to sort by
         rows[f"{which}_text"] = error.map(short).where(table.quantity != REFUSAL, refusal)
         rows[f"{which}_bad"] = error > table.bound
-    return SideTable(NAME, CAPTION, COLUMNS, rows, REMARK, block="family")
+    return SideLayout(NAME, CAPTION, COLUMNS, rows, REMARK, block="family")
 
 
 def short(error: float) -> str:
@@ -68,3 +63,15 @@ def short(error: float) -> str:
         return f"{error:.2g}" if error < 100 else f"{error:,.0f}"
     mantissa, exponent = f"{error:.1e}".split("e")
     return f"{mantissa}e{int(exponent)}".replace("-", "\u2212")
+
+
+@SideTable(name="hard_cases", title="Hard cases", rank=100, mem_mb=2000)
+class HardCasesTable(Table):
+    """A row for each case that is easy to get wrong."""
+
+    schema = SCHEMA
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Run our functions on all cases; errors may be infinite."""
+        return frame_of(examined(CASES), SCHEMA)

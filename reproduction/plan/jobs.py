@@ -16,10 +16,10 @@ FRAME_PX, STEP_PX = 50_000, 10_000
 # Jobs of these cost the same in every profile, as do those that are done once for a run.
 SCENE = ("scene", "detail", "plan", "coverage", "cell_depth", "light_shares", "cartons", "dataset")
 LABELS = ("true_labels", "erroneous_labels", "posegraph", "chain")
-OTHERS = ("pretrain", "varied_structure", "render_speed", "collection_speed", "table")
+OTHERS = ("pretrain", "varied_structure", "render_speed", "collection_speed", "table", "side_table")
 ALIKE = SCENE + LABELS + OTHERS
 # What jobs of a rule differ in beside their size.
-VARIANTS = ("frame_method", "graph_method", "effects", "table", "model")
+VARIANTS = ("frame_method", "graph_method", "effects", "table", "side", "model")
 
 
 def jobs_of(files: Files) -> pd.DataFrame:

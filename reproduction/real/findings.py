@@ -12,7 +12,7 @@ import pandas as pd
 from reproduction.real.design import BOTH, GIVEN, PHOTOGRAPHS, RANDOMISED, RENDERED, SFM
 from reproduction.tables.columns import side_sheet
 from reproduction.tables.layouts import TITLES
-from reproduction.tables.real import DIRECTIONS, LOST, METHODS, NAME, read_real, side_table
+from reproduction.tables.real import DIRECTIONS, LOST, METHODS, NAME, read_real, side_layout
 from reproduction.tables.sheet import markdown_table, sheet_markdown
 from synfeal.records.tables import rows_of
 
@@ -103,7 +103,7 @@ def _best(table: pd.DataFrame, trained_on: str) -> Any | None:
 def real_table(root: Path) -> str:
     """Format the table of a published run."""
     table = read_real(root / "tables" / f"{NAME}.csv")
-    return sheet_markdown(side_sheet(side_table(table))).rstrip()
+    return sheet_markdown(side_sheet(side_layout(table))).rstrip()
 
 
 def sentences(table: pd.DataFrame) -> Iterator[str]:

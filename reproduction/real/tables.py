@@ -35,7 +35,7 @@ from reproduction.real.scores import (
     times_as_exact,
 )
 from reproduction.tables.columns import write_side
-from reproduction.tables.real import AMOUNT, COVER, RUNS, SCHEMA, side_table
+from reproduction.tables.real import AMOUNT, COVER, RUNS, SCHEMA, side_layout
 from synfeal.records.files import read_json
 from synfeal.records.tables import NUMBER, frame_of, read_frame, write_frame
 
@@ -109,7 +109,7 @@ def write_real_tables(
     rows = [row for part in design.parts for row in _rows(config, design, scored[part])]
     table = frame_of(rows, SCHEMA)
     write_frame(out_table, table)
-    write_side(out_tex, side_table(table))
+    write_side(out_tex, side_layout(table))
     write_frame(out_runs, frame_of(_runs(config, design, scored), RUNS))
     write_frame(out_amount, frame_of(_amounts(config, design), AMOUNT))
     write_frame(out_cover, frame_of(_covers(config, design, scored), COVER))

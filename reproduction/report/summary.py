@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
 from reproduction.design.experiments import Design
-from reproduction.tables import meshes, recall, references, robustness
+from reproduction.design.side_tables import SIDE_TABLES
+from reproduction.tables import meshes
 from reproduction.tables.cells import read_cells
 from reproduction.tables.columns import side_sheet
 from reproduction.tables.layouts import TITLES, scene_title
-from reproduction.tables.references import crossing_findings
 from reproduction.tables.sheet import sheet_markdown
+from reproduction.tables.side import read_side_table, table_named
 from reproduction.tables.write import sheet_of
 from synfeal.records.files import write_text
-from synfeal.records.tables import read_frame, rows_of
+from synfeal.records.tables import rows_of
 
-SIDE_TABLES: Sequence[Any] = (references, recall, robustness)  # a run may lack some
 ALIVE = "table4_size"
 FOUND = "## Do the localizers localize?"
 INTRO = """\
@@ -42,15 +41,15 @@ def write_summary(design: Design, root: Path, out_md: Path) -> None:
     """
     cells = {name: read_cells(name, design, root) for name in design.tables}
     findings = run_sentences(cells)
-    mesh_facts = meshes.read_meshes([*dict.fromkeys(row.scene for row in design.rows)], root)
-    sheets = [side_sheet(meshes.side_table(mesh_facts))]
-    sheets += [sheet_of(name, found) for name, found in cells.items()]
-    for module in SIDE_TABLES:
-        path = root / "tables" / f"{module.NAME}.csv"
+    scores = [sheet_of(name, found) for name, found in cells.items()]
+    sheets = []
+    for name in (name for name, side in SIDE_TABLES.items() if side.in_summary):
+        path = root / "tables" / f"{name}.csv"
         if path.exists():
-            table = read_frame(path, module.SCHEMA)
-            findings += crossing_findings(table) if module is references else []
-            sheets.append(side_sheet(module.side_table(table)))
+            rows, layout = read_side_table(name, path)
+            findings += table_named(name).findings(rows)
+            sheets.append(side_sheet(layout))
+        sheets += scores if name == meshes.NAME else []
     parts = [
         INTRO.format(profile=root.name),
         f"{FOUND}\n",

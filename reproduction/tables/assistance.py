@@ -11,10 +11,10 @@ from pydantic import BaseModel
 
 from baselines.labels.chain import BatchRecord
 from baselines.labels.methods import METHODS
-from reproduction.design.experiments import Design
 from reproduction.runs.results import read_result, shaped
-from reproduction.tables.columns import Column, SideTable, write_side
+from reproduction.tables.columns import Column, SideLayout
 from reproduction.tables.layouts import SOURCES, data_set_titles
+from reproduction.tables.side import SideTable, Source, Table
 from synfeal.records.tables import (
     COUNT,
     MAYBE,
@@ -22,7 +22,6 @@ from synfeal.records.tables import (
     MAYBE_TEXT,
     TEXT,
     frame_of,
-    write_frame,
 )
 
 NAME = "assistance"
@@ -79,25 +78,6 @@ class _Split(BaseModel):
 class _Splits(BaseModel):
     train: _Split
     test: _Split
-
-
-def write_assistance_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write how often label methods needed assistance, and how far off their batches ended.
-
-    Args:
-        design: The profile's table of experiments.
-        root: Results of the profile.
-        out_csv: CSV to write: for each re-estimated label set a row per split, and one of both.
-        out_tex: LaTeX to write: the rows of both splits together.
-    """
-    records = [
-        assistance_record(root, *label_set, split)
-        for label_set in design.estimated
-        for split in (*SPLITS, TOTAL)
-    ]
-    table = frame_of(records, SCHEMA)
-    write_frame(out_csv, table)
-    write_side(out_tex, side_table(table))
 
 
 def assistance_record(
@@ -176,13 +156,13 @@ def truth_used_by(root: Path, scene: str, size: str, method: str) -> str:
     return str(read_result(path, ["splits"], "chain these labels again").get("truth_used", ""))
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Lay out the rows of both splits together."""
     rows = of_both_splits(table)
     for when in ("before", "after"):
         errors = rows[[f"last_m_{when}_median", f"last_deg_{when}_median"]].to_numpy(float)
         rows[when] = ["–" if np.isnan(m) else f"{m:.2f} m, {deg:.2f}°" for m, deg in errors]
-    return SideTable(NAME, CAPTION, COLUMNS, rows, REMARK, block="data_set")
+    return SideLayout(NAME, CAPTION, COLUMNS, rows, REMARK, block="data_set")
 
 
 def of_both_splits(table: pd.DataFrame) -> pd.DataFrame:
@@ -190,3 +170,25 @@ def of_both_splits(table: pd.DataFrame) -> pd.DataFrame:
     rows = table[table.split == TOTAL]
     titles = rows.method.map(lambda method: SOURCES.get(method, method))
     return rows.assign(data_set=data_set_titles(rows), title=titles)
+
+
+@SideTable(
+    name="assistance",
+    title="Assistance",
+    rank=50,
+    needs=("labels/{estimated_set}/assistance.json",),
+)
+class AssistanceTable(Table):
+    """For each estimated label set a row per split, and one of both."""
+
+    schema = SCHEMA
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Count what assistance batches needed."""
+        records = [
+            assistance_record(source.root, *label_set, split)
+            for label_set in source.design.estimated
+            for split in (*SPLITS, TOTAL)
+        ]
+        return frame_of(records, SCHEMA)

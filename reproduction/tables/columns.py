@@ -1,7 +1,7 @@
 """Side tables: columns defined once for the page, LaTeX and Markdown.
 
-A module with a side table has a ``SCHEMA`` of its CSV and a function ``side_table`` that makes one
-of the rows read from it. A new column is a line there.
+A side table (:class:`reproduction.tables.side.Table`) has a schema of its CSV, and lays out rows
+that are read from it. A new column is a line in either.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class Column:
 
 
 @dataclass(frozen=True)
-class SideTable:
-    """A table beside tables 2 to 7."""
+class SideLayout:
+    """A table beside tables 2 to 7, laid out."""
 
     name: str  # of its files, without suffix
     caption: str  # what it shows, in a sentence or two
@@ -123,12 +123,12 @@ def method_columns(titles: Mapping[str, str], on_paper: bool = True) -> list[Col
     ]
 
 
-def write_side(path: Path, table: SideTable) -> None:
+def write_side(path: Path, table: SideLayout) -> None:
     """Write a side table as LaTeX."""
     write_latex(path, side_sheet(table))
 
 
-def side_sheet(table: SideTable) -> Sheet:
+def side_sheet(table: SideLayout) -> Sheet:
     """Lay out a side table as it is printed on paper; the paper's values are a grey line below.
 
     Lines with the label of the one above belong to the same row, and do not repeat it.

@@ -13,12 +13,12 @@ from pydantic import FiniteFloat
 from baselines.labels.alignment import ALIGNMENTS, aligned_errors
 from baselines.labels.label_error import Pair, absolute_errors, relative_error, share_within, spread
 from baselines.labels.methods import METHODS, stages_of
-from reproduction.design.experiments import Design
 from reproduction.runs.results import read_result
 from reproduction.tables.assistance import SPLITS, TOTAL, batch_records, of_both_splits
-from reproduction.tables.columns import Column, SideTable, write_side
+from reproduction.tables.columns import Column, SideLayout
+from reproduction.tables.side import SideTable, Source, Table
 from synfeal.dataset.pose_table import read_pose_table
-from synfeal.records.tables import COUNT, EXTRA, MAYBE, NUMBER, TEXT, frame_of, write_frame
+from synfeal.records.tables import COUNT, EXTRA, MAYBE, NUMBER, TEXT, frame_of
 
 NAME = "label_error"
 # Labels without assistance, and the labels of the data set, by the name of their files.
@@ -77,27 +77,6 @@ REMARK = (
     " labels were had no last pose been replaced. Drift: errors of the motion over 25 frames, by"
     " the metre travelled; a replaced pose adds to it. Figures show both along the sequence."
 )
-
-
-def write_label_error_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write the errors of re-estimated labels against the true poses, and what a frame took.
-
-    Args:
-        design: The profile's table of experiments.
-        root: Results of the profile.
-        out_csv: CSV to write: for each re-estimated label set and split, and for both splits
-            together, a row before and one after assistance.
-        out_tex: LaTeX to write: the rows of both splits together.
-    """
-    records = [
-        record
-        for label_set in design.estimated
-        for split in (*SPLITS, TOTAL)
-        for record in label_records(root, *label_set, split)
-    ]
-    table = frame_of(records, SCHEMA)
-    write_frame(out_csv, table)
-    write_side(out_tex, side_table(table))
 
 
 def label_records(
@@ -183,8 +162,36 @@ def cost_record(
     return {"seconds_per_frame": seconds / frames, "peak_memory_mb": max(peaks)}
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Lay out a row before and a row after assistance for every method and data set."""
     rows = of_both_splits(table)
     rows = rows.assign(share_registered=1 - rows.share_filled)
-    return SideTable(NAME, CAPTION, COLUMNS, rows, REMARK, block="data_set")
+    return SideLayout(NAME, CAPTION, COLUMNS, rows, REMARK, block="data_set")
+
+
+@SideTable(
+    name="label_error",
+    title="Label error",
+    rank=60,
+    needs=(
+        "labels/{estimated_set}/assistance.json",
+        "labels/{estimated_set}/{split}-unassisted.csv",
+        "labels/{pose_set}/{split}.csv",
+        "estimates/{estimated_batch}.json",
+    ),
+)
+class LabelErrorTable(Table):
+    """Errors of estimated labels and what a frame took, before and after assistance."""
+
+    schema = SCHEMA
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Compare all estimated labels with the true poses."""
+        records = [
+            record
+            for label_set in source.design.estimated
+            for split in (*SPLITS, TOTAL)
+            for record in label_records(source.root, *label_set, split)
+        ]
+        return frame_of(records, SCHEMA)

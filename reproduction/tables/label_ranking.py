@@ -33,8 +33,9 @@ from baselines.training.score import read_predictions
 from reproduction.design.experiments import Design
 from reproduction.design.ranking import Ranking, rankings
 from reproduction.statistics.ranking import agreement
-from reproduction.tables.columns import NOTHING, Column, SideTable, write_side
+from reproduction.tables.columns import NOTHING, Column, SideLayout
 from reproduction.tables.layouts import data_set_titles, label_title
+from reproduction.tables.side import SideTable, Source, Table
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import InputError
 from synfeal.evaluation.bootstrap import Array, Counts, mean_of, medians
@@ -46,7 +47,6 @@ from synfeal.records.tables import (
     frame_of,
     read_frame,
     records_of,
-    write_frame,
 )
 
 NAME = "label_ranking"
@@ -83,24 +83,21 @@ REMARK = (
 LINES = ["data_set", "labels", "trained_on", "methods"]
 
 
-def write_label_ranking_table(
-    design: Design, references: ReferencesConfig, root: Path, out_csv: Path, out_tex: Path
-) -> None:
-    """Write which labels rank methods as the truth does.
+def label_ranking_table(design: Design, references: ReferencesConfig, root: Path) -> pd.DataFrame:
+    """Tabulate which labels rank methods as the truth does.
 
     Args:
         design: The profile's table of experiments.
         references: Reference methods that are ranked beside the localizers.
         root: Results of the profile.
-        out_csv: CSV to write: a row per label set, origin of the predictions and score.
-        out_tex: LaTeX to write: the same, a column per score.
+
+    Returns:
+        Columns ``SCHEMA``: a row per label set, origin of the predictions and score.
     """
-    records = [
-        record for ranking in rankings(design, references) for record in ranked(ranking, root)
-    ]
-    table = frame_of(records, SCHEMA)
-    write_frame(out_csv, table)
-    write_side(out_tex, side_table(table))
+    return frame_of(
+        [record for ranking in rankings(design, references) for record in ranked(ranking, root)],
+        SCHEMA,
+    )
 
 
 def ranked(ranking: Ranking, root: Path) -> list[dict[str, Any]]:
@@ -159,7 +156,7 @@ def sample_of(
     return np.asarray(counts @ hits / (counts @ frames * len(runs)), dtype=np.float64)
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Lay out a row for each label set and origin of the predictions, a column per score."""
     cells = table.assign(
         data_set=data_set_titles(table),
@@ -188,7 +185,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
         ),
         Column("Reversed, pairs", "reversed", "{:.0f}"),
     ]
-    return SideTable(NAME, CAPTION, columns, rows, REMARK, block="data_set")
+    return SideLayout(NAME, CAPTION, columns, rows, REMARK, block="data_set")
 
 
 def rightly_from(rows: pd.DataFrame) -> str:
@@ -214,7 +211,7 @@ def _limits(row: Mapping[str, Any]) -> str:
 
 
 def read_label_ranking(path: Path) -> pd.DataFrame:
-    """Read the table that :func:`write_label_ranking_table` wrote."""
+    """Read the table that the rule ``side_table`` wrote."""
     return read_frame(path, SCHEMA)
 
 
@@ -223,3 +220,23 @@ def _read(path: Path, truth: PoseTable) -> PoseTable:
     if not np.array_equal(predicted.frame, truth.frame):
         raise InputError(f"{path}: its frames are not those of the test set; predict again")
     return predicted
+
+
+@SideTable(
+    name="label_ranking",
+    title="Label ranking",
+    rank=70,
+    needs=("{ranked}/predictions.csv", "labels/{ranking_set}/test.csv"),
+    settings=("references",),
+    in_document=True,
+)
+class LabelRankingTable(Table):
+    """How labels rank methods, beside how the truth does."""
+
+    schema = SCHEMA
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Rank the methods by all labels."""
+        settings = ReferencesConfig.model_validate(source.settings["references"])
+        return label_ranking_table(source.design, settings, source.root)

@@ -10,8 +10,9 @@ import pandas as pd
 
 from reproduction.runs.results import read_result
 from reproduction.tables.cells import FOLDER
-from reproduction.tables.columns import Column, SideTable, write_side
+from reproduction.tables.columns import Column, SideLayout
 from reproduction.tables.layouts import scene_title
+from reproduction.tables.side import SideTable, Source, Table
 from synfeal.records.tables import (
     COUNT,
     MAYBE,
@@ -21,7 +22,6 @@ from synfeal.records.tables import (
     frame_of,
     read_frame,
     records_of,
-    write_frame,
 )
 
 NAME = "table1_meshes"
@@ -45,20 +45,6 @@ REMARK = (
     "Vertices at distinct positions, as a scan file counts them: copies along texture seams count"
     " once. Volume of the axis-aligned bounding box. In grey: the meshes of the paper."
 )
-
-
-def write_meshes_table(scenes: Sequence[str], root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write Table 1 from the properties of the scenes' meshes.
-
-    Args:
-        scenes: Names of the scenes.
-        root: Results of the profile.
-        out_csv: CSV to write: a row per scene, columns ``SCHEMA``.
-        out_tex: LaTeX to write, laid out as in the paper.
-    """
-    meshes = read_meshes(scenes, root)
-    write_frame(out_csv, meshes)
-    write_side(out_tex, side_table(meshes))
 
 
 @dataclass(frozen=True)
@@ -87,7 +73,7 @@ def read_mesh_facts(root: Path, scene: str) -> MeshFacts:
     return facts
 
 
-def side_table(meshes: pd.DataFrame) -> SideTable:
+def side_layout(meshes: pd.DataFrame) -> SideLayout:
     """Lay out Table 1 as the paper prints it: properties down, scenes across."""
     columns = [Column("Property", "fact")]
     rows = pd.DataFrame({"fact": [title for title, _ in FACTS.values()]})
@@ -97,4 +83,23 @@ def side_table(meshes: pd.DataFrame) -> SideTable:
         for name, start in {scene: "", printed: "published_"}.items():
             values = [(mesh[f"{start}{fact}"], form) for fact, (_, form) in FACTS.items()]
             rows[name] = [None if pd.isna(value) else form.format(value) for value, form in values]
-    return SideTable(NAME, CAPTION, columns, rows, REMARK)
+    return SideLayout(NAME, CAPTION, columns, rows, REMARK)
+
+
+@SideTable(
+    name="table1_meshes",
+    title="Table 1",
+    rank=10,
+    needs=("scenes/{scene}/properties.json",),
+    in_document=True,
+    in_summary=True,
+)
+class MeshesTable(Table):
+    """Table 1: a row per scene."""
+
+    schema = SCHEMA
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Read the properties of the scenes' meshes."""
+        return read_meshes(source.scenes, source.root)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from reproduction.tables.columns import NOTHING, Column, SideTable
+from reproduction.tables.columns import NOTHING, Column, SideLayout
 from reproduction.tables.layouts import TITLES
 from synfeal.records.tables import (
     COUNT,
@@ -89,7 +89,7 @@ def block_title(direction: str, labels: str) -> str:
     return DIRECTIONS[direction] + (WITH_SFM if labels == "sfm" else "")
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Lay out a line per training and localizer, a block per direction and source of labels."""
     rows = table.assign(
         block=[block_title(row.direction, row.labels) for row in rows_of(table)],
@@ -119,7 +119,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
         Column("Worst seed", "position_m_worst", "{:.3f} m", on_paper=False),
         Column("Photographs", "n_test", "{:.0f}", on_paper=False),
     ]
-    return SideTable(NAME, CAPTION, columns, rows, remark_on(table), block="block")
+    return SideLayout(NAME, CAPTION, columns, rows, remark_on(table), block="block")
 
 
 def _sfm_columns(table: pd.DataFrame) -> list[Column]:

@@ -16,11 +16,12 @@ from baselines.labels.methods import SIMULATOR
 from reproduction.design.experiments import Design, Run
 from reproduction.runs.results import read_result, shaped
 from reproduction.statistics.limits import REMEDY
-from reproduction.tables.columns import Column, SideTable, write_side
+from reproduction.tables.columns import Column, SideLayout
 from reproduction.tables.layouts import TITLES, data_set_titles, label_title
+from reproduction.tables.side import SideTable, Source, Table
 from synfeal.evaluation.metrics import BOUNDS, MEANS, ORIENTATION, POSITION
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
-from synfeal.records.tables import COUNT, MAYBE, TEXT, frame_of, write_frame
+from synfeal.records.tables import COUNT, MAYBE, TEXT, frame_of
 
 NAME = "recall"
 KEYS = ["scene", "size", "labels", "init", "model"]
@@ -58,21 +59,6 @@ SHOWN = (
 )
 
 
-def write_recall_table(design: Design, root: Path, out_csv: Path, out_tex: Path) -> None:
-    """Write means, recalls and reprojection errors of all cells, each with 95 % limits.
-
-    Args:
-        design: The profile's table of experiments.
-        root: Results of the profile.
-        out_csv: CSV to write: a row per cell of any table, scores against the labels and, under
-            names that end in ``_true``, against the true poses; empty where a run failed.
-        out_tex: LaTeX to write: the cells whose labels are true poses.
-    """
-    table = recall_table(design, root)
-    write_frame(out_csv, table)
-    write_side(out_tex, side_table(table))
-
-
 def recall_table(design: Design, root: Path) -> pd.DataFrame:
     """Tabulate scores of every cell, columns ``SCHEMA``; missing where a repetition has none."""
     runs = sorted(design.runs, key=lambda run: (*_key(run)[:-1], MODELS.index(run.model)))
@@ -99,7 +85,7 @@ def _read(path: Path) -> dict[str, float | None]:
     return scores
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Lay out a row for every run; on paper those whose labels are true, if there are any."""
     true = (table.labels == SIMULATOR) & (table.init == "pretrained")
     rows = table.assign(
@@ -108,4 +94,23 @@ def side_table(table: pd.DataFrame) -> SideTable:
         model=table.model.map(TITLES),
         on_paper=true | (not true.any()),
     )
-    return SideTable(NAME, CAPTION, SHOWN, rows, REMARK, block="data_set")
+    return SideLayout(NAME, CAPTION, SHOWN, rows, REMARK, block="data_set")
+
+
+@SideTable(
+    name="recall",
+    title="Recall",
+    rank=30,
+    needs=("runs/{run}/metrics.json",),
+    in_document=True,
+    in_summary=True,
+)
+class RecallTable(Table):
+    """Means, recalls and reprojection errors of every cell of any table."""
+
+    schema = SCHEMA
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Read the scores of all runs."""
+        return recall_table(source.design, source.root)

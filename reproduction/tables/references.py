@@ -23,10 +23,9 @@ from reproduction.tables.cells import LIMITS, MOVED
 from reproduction.tables.columns import (
     NOTHING,
     Column,
-    SideTable,
+    SideLayout,
     by_method,
     method_columns,
-    write_side,
 )
 from reproduction.tables.layouts import (
     DOSE,
@@ -36,6 +35,7 @@ from reproduction.tables.layouts import (
     label_title,
     scene_title,
 )
+from reproduction.tables.side import SideTable, Source, Table
 from synfeal.evaluation.metrics import BOUNDS
 from synfeal.records.tables import (
     COUNT,
@@ -48,7 +48,6 @@ from synfeal.records.tables import (
     read_frame,
     records_of,
     rows_of,
-    write_frame,
 )
 
 NAME, LOCALIZER = "references", "localizer"
@@ -72,25 +71,6 @@ CAPTION = (
     " and the share of the test frames within 5 cm and 5 degrees."
 )
 REMARK = "Answers that failed count as infinite errors. The best localizer is so by position."
-
-
-def write_references_table(
-    design: Design, references: ReferencesConfig, root: Path, out_csv: Path, out_tex: Path
-) -> None:
-    """Write the scores of all reference methods and localizers, data set by data set.
-
-    Localizers are those that start pretrained; ``external`` ones are somebody else's.
-
-    Args:
-        design: The profile's table of experiments.
-        references: Groups of methods that were asked, and external localizers.
-        root: Results of the profile.
-        out_csv: CSV to write: a row per data set and method, columns ``SCHEMA``.
-        out_tex: LaTeX to write: a row per label set and score, a column per method.
-    """
-    table = references_table(design, references, root)
-    write_frame(out_csv, table)
-    write_side(out_tex, side_table(table))
 
 
 def references_table(design: Design, references: ReferencesConfig, root: Path) -> pd.DataFrame:
@@ -137,7 +117,7 @@ def references_table(design: Design, references: ReferencesConfig, root: Path) -
 
 
 def read_references(path: Path) -> pd.DataFrame:
-    """Read the table that :func:`write_references_table` wrote."""
+    """Read the table that the rule ``side_table`` wrote."""
     return read_frame(path, SCHEMA)
 
 
@@ -156,7 +136,7 @@ def _record(folders: Sequence[Path]) -> dict[str, Any]:
     return scores | {column: fmean(m[name] for m in every) for name, column in names.items()}
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Lay out a row per label set and score, a column per method, and what an answer takes.
 
     Where labels are the true poses, both scores are one.
@@ -179,7 +159,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
     rows["on_paper"] = ~rows.labels.isin([TIME, PREPARATION])  # paper is the same in every run
     moved = bool((table[MOVED] > table.noise_m).any())
     remark = f"{REMARK} {DOSE}" if moved else REMARK
-    return SideTable(NAME, CAPTION, columns, rows, remark, block="data_set")
+    return SideLayout(NAME, CAPTION, columns, rows, remark, block="data_set")
 
 
 def _cells(table: pd.DataFrame, against: str, end: str) -> pd.DataFrame:
@@ -282,3 +262,32 @@ def two_digits(value: float) -> str:
     """Format a positive number with two significant digits, and all before the point."""
     places = max(0, 1 - math.floor(math.log10(value))) if 0 < value < math.inf else 0
     return f"{value:.{places}f}"
+
+
+@SideTable(
+    name="references",
+    title="References",
+    rank=20,
+    needs=(
+        "runs/{run}/metrics.json",
+        "references/{reference}/metrics.json",
+        "references/{reference}/facts.json",
+    ),
+    settings=("references",),
+    in_document=True,
+    in_summary=True,
+)
+class ReferencesTable(Table):
+    """Scores of reference methods and localizers, data set by data set."""
+
+    schema = SCHEMA
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Read the scores of all methods."""
+        settings = ReferencesConfig.model_validate(source.settings["references"])
+        return references_table(source.design, settings, source.root)
+
+    def findings(self, rows: pd.DataFrame) -> list[str]:
+        """Say from which noise structure stops being better."""
+        return crossing_findings(rows)

@@ -12,8 +12,9 @@ import pandas as pd
 from baselines.config.learning import MODELS
 from baselines.references.registry import REFERENCES
 from baselines.references.robustness import SCHEMA, STRUCTURE, robustness_table
-from reproduction.tables.columns import Column, SideTable, by_method, method_columns, write_side
+from reproduction.tables.columns import Column, SideLayout, by_method, method_columns
 from reproduction.tables.layouts import TITLES
+from reproduction.tables.side import SideTable, Source, Table
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.records.tables import read_frame, write_frame
 
@@ -27,7 +28,7 @@ CAPTION = (
 )
 
 
-def write_robustness_table(
+def write_robustness_scores(
     clean: Sequence[Path],
     mixed: Sequence[Path],
     descriptors: Sequence[Path],
@@ -38,9 +39,8 @@ def write_robustness_table(
     effects: Sequence[str],
     device: Literal["auto", "cpu", "cuda"],
     out_csv: Path,
-    out_tex: Path,
 ) -> None:
-    """Measure the robustness table and write it.
+    """Measure how well methods stand effects, and write it.
 
     Args:
         clean: Checkpoints of all localizers trained on ideal frames.
@@ -53,8 +53,7 @@ def write_robustness_table(
         labels: Label files, in one folder.
         effects: Names of the effects.
         device: Device of prediction.
-        out_csv: Table to write.
-        out_tex: LaTeX to write.
+        out_csv: CSV to write, columns ``SCHEMA``: the rows of the table.
     """
     models = {
         name: dict(zip(MODELS, m, strict=True)) for name, m in ((CLEAN, clean), (MIXED, mixed))
@@ -62,17 +61,17 @@ def write_robustness_table(
     tests = dict(zip((CLEAN, *effects), (test, *varied), strict=True))
     answers = dict(zip(tests, structure, strict=bool(structure)))
     vectors = dict(zip(models, descriptors, strict=True))
-    table = robustness_table(models, vectors, answers, tests, labels[0].parent, device)
-    write_frame(out_csv, table)
-    write_side(out_tex, side_table(table))
+    write_frame(
+        out_csv, robustness_table(models, vectors, answers, tests, labels[0].parent, device)
+    )
 
 
 def read_robustness(path: Path) -> pd.DataFrame:
-    """Read the table that :func:`write_robustness_table` wrote."""
+    """Read the table, or what it is made from, which :func:`write_robustness_scores` wrote."""
     return read_frame(path, SCHEMA)
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Lay out a row for each training set and each of the effects, a column per method."""
     texts = [
         table[measure].map(partial(printed, digits=digits)) + unit
@@ -90,7 +89,7 @@ def side_table(table: pd.DataFrame) -> SideTable:
         *method_columns({name: METHODS[name] for name in table.method.unique()}),
     ]
     rows = by_method(cells, ["trained_on", "effects"])
-    return SideTable(NAME, CAPTION, columns, rows, remark_on(table), block="trained_on")
+    return SideLayout(NAME, CAPTION, columns, rows, remark_on(table), block="trained_on")
 
 
 def printed(value: float, digits: int) -> str:
@@ -115,3 +114,22 @@ def effects_title(effects: str) -> str:
         return "ideal"
     name, _, strength = effects.rpartition("_")
     return f"{name.replace('_', ' ')}, strength {strength}" if strength.isdigit() else effects
+
+
+@SideTable(
+    name="robustness",
+    title="Robustness",
+    rank=40,
+    needs=("robustness/{tested_scene}.csv",),
+    in_document=True,
+    in_summary=True,
+)
+class RobustnessTable(Table):
+    """The same test paths with effects of a camera and of changing light."""
+
+    schema = SCHEMA
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Read what the rule ``robustness`` measured."""
+        return read_robustness(next((source.root / "robustness").glob("*.csv")))

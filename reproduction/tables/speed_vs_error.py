@@ -12,9 +12,10 @@ from reproduction.speed.collection import EFFECTS_SCHEMA
 from reproduction.speed.rendering import SCHEMA as RENDERED
 from reproduction.tables import robustness
 from reproduction.tables.assistance import TOTAL
-from reproduction.tables.columns import Column, SideTable
+from reproduction.tables.columns import Column, SideLayout
 from reproduction.tables.label_error import SCHEMA as LABEL_ERROR
 from reproduction.tables.layouts import SOURCES, TITLES, scene_title
+from reproduction.tables.side import SideTable, Source, Table
 from synfeal.collection.collision import CURVE_HEADER
 from synfeal.config.effects import CLEAN
 from synfeal.errors import InputError
@@ -29,7 +30,6 @@ from synfeal.records.tables import (
     read_numbers,
     records_of,
     rows_of,
-    write_frame,
 )
 
 # The table whose training runs are shown, and the part of their names that all of them share.
@@ -106,20 +106,6 @@ SCHEMA = {
     "depth_error_mm": MAYBE,
     "depth_off_share": MAYBE,
 }
-
-
-def write_speed_vs_error(scenes: Sequence[str], root: Path, out_csv: Path) -> None:
-    """Write speed and error of the variants that each stage could choose among.
-
-    Speeds are measured, so this table is not the same in every run.
-
-    Args:
-        scenes: Names of the scenes.
-        root: Results of the profile.
-        out_csv: CSV to write: a row per stage, scene and variant; ``chosen`` is 1 where the
-            pipeline uses it.
-    """
-    write_frame(out_csv, pd.concat([speeds_of(stage, scenes, root) for stage in READERS]))
 
 
 def speeds_of(stage: str, scenes: Sequence[str], root: Path) -> pd.DataFrame:
@@ -261,8 +247,35 @@ CAPTION = (
 )
 
 
-def side_table(table: pd.DataFrame) -> SideTable:
+def side_layout(table: pd.DataFrame) -> SideLayout:
     """Tabulate each stage's variants, how fast and how wrong each is."""
     used, style = (table.chosen.map({1: text, 0: ""}) for text in ("✓", "used"))
     rows = table.assign(scene=table.scene.map(scene_title), used=used, style=style)
-    return SideTable(NAME, CAPTION, COLUMNS, rows)
+    return SideLayout(NAME, CAPTION, COLUMNS, rows)
+
+
+@SideTable(
+    name="speed_vs_error",
+    title="Speed vs error",
+    rank=90,
+    needs=(
+        "scenes/{scene}/collision_curve.csv",
+        "scenes/{scene}/render_speed.csv",
+        "scenes/{timed_scene}/effects_speed.csv",
+        "tables/{table:label_error}.csv",
+        "tables/{table:robustness}.csv",
+        "tables/{table:table4_size}.csv",
+        "runs/{run:table4_size}/history.csv",
+        "benchmarks/train/{run:table4_size}.tsv",
+    ),
+)
+class SpeedVsErrorTable(Table):
+    """Speed and error of the variants that each stage could choose among."""
+
+    schema = SCHEMA
+    layout = staticmethod(side_layout)
+
+    def rows(self, source: Source) -> pd.DataFrame:
+        """Read speeds, which are measured and so not the same in every run."""
+        stages = [speeds_of(stage, source.scenes, source.root) for stage in READERS]
+        return pd.concat(stages, ignore_index=True)

@@ -167,7 +167,7 @@ DECLARED = "from baselines.registry.kinds import LabelError\n{}\ndef error(table
         ('@LabelError(name="x" * 2, title="Mine")', None, "line 2: @LabelError: arguments must be"),
         ('@LabelError(name="Mine", title="Mine")', None, "name: 'Mine' must be lower-case"),
         ('@LabelError(name="mine")', None, "missing 1 required keyword-only argument: 'title'"),
-        ("", None, "declares no method, though the entry point 'mine'"),
+        ("", None, "declares nothing, though the entry point 'mine'"),
         ("", "mine = my_methods.gone\n", "the entry point 'mine' of synfeal.methods is not there"),
     ],
 )

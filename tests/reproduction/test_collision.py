@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reproduction.figures.registry import write_figures
-from reproduction.tables.speed_vs_error import speeds_of, write_speed_vs_error
+from reproduction.tables.speed_vs_error import speeds_of
 from synfeal.collection.collision import (
     Rung,
     collision_mesh,
@@ -205,5 +205,4 @@ def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path):
     drawn = {path.name for path in (tmp_path / "figures").iterdir()}
     assert drawn == {f"speed_vs_error_collision.{end}" for end in ("png", "svg")}
     with pytest.raises(InputError, match=r"sanctuary/collision_curve\.csv"):
-        write_speed_vs_error(["sanctuary"], tmp_path, tmp_path / "table.csv")
-    assert not (tmp_path / "table.csv").exists()
+        speeds_of("collision", ["sanctuary"], tmp_path)

@@ -9,6 +9,7 @@ from reproduction.config.load import load_config
 from reproduction.design.experiments import read_design
 from reproduction.design.files import Files
 from reproduction.design.jobs import jobs_of_run
+from reproduction.design.side_tables import made_side_tables
 from tests import CONFIG
 
 ROW = {"table": "table4_size", "scene": "large_room", "size": "6k"}
@@ -34,9 +35,9 @@ def test_one_row_needs_its_scene_five_runs_and_no_large_frame():
         "posenet2",
     }
     assert len(jobs["train"]) == 5
-    assert not {"render", "dataset", "sfm", "rgbd", "chain", "features", "assistance"} & set(jobs)
+    assert not {"render", "dataset", "sfm", "rgbd", "chain", "features"} & set(jobs)
     assert files.manifests("estimation") == []
-    assert files.label_tables == ()
+    assert not {"assistance", "label_error"} & set(made_side_tables(files))
 
 
 def test_an_estimated_row_adds_its_batches_and_large_frames():

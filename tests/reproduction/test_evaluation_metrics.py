@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from baselines.training.score import score_run
-from reproduction.tables.recall import COLUMNS, SCHEMA, recall_table, write_recall_table
+from reproduction.tables.recall import COLUMNS, SCHEMA, recall_table
+from reproduction.tables.side import write_side_table
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
@@ -160,7 +161,9 @@ def test_a_run_is_scored_by_the_same_module_and_becomes_a_row(tmp_path):
     depth_m = read_cell_depth(tmp_path / "depth.npy", 40)
     expected = np.median(dcre(predicted, table_of(truth), depth_m, CAMERA))
     assert metrics["dcre"] == metrics["dcre_true"] == pytest.approx(expected)
-    write_recall_table(design, tmp_path, tmp_path / "recall.csv", tmp_path / "recall.tex")
+    write_side_table(
+        "recall", design, {}, tmp_path, tmp_path / "recall.csv", tmp_path / "recall.tex"
+    )
     table = read_frame(tmp_path / "recall.csv", SCHEMA)
     assert len(table) == 5
     for column in COLUMNS:

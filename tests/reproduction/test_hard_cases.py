@@ -14,8 +14,10 @@ from reproduction.report.html.tables import side_html
 from reproduction.statistics import limits
 from reproduction.tables.columns import side_sheet
 from reproduction.tables.sheet import sheet_latex
+from reproduction.tables.side import write_side_table
 from synfeal.records.tables import read_frame
 from tests.support import hard_case_values as references
+from tests.support.report_results import design_of
 
 FAMILIES = list(dict.fromkeys(family.name for family in cases.CASES))
 
@@ -28,10 +30,11 @@ def rows():
 def test_every_case_keeps_its_bound_and_pages_mark_what_exceeds_it(rows, tmp_path):
     assert [(row["case"], row["our_error"]) for row in rows if not row["ok"]] == []
     assert len(stored_values()) == len(rows) >= 45
-    hard_table.write_hard_cases(tmp_path / "table.csv")
+    files = (tmp_path / "table.csv", tmp_path / "table.tex")
+    write_side_table("hard_cases", design_of(()), {}, tmp_path, *files)
     header, *_ = (tmp_path / "table.csv").read_text().splitlines()
     assert header == ",".join(hard_table.SCHEMA)
-    table = hard_table.side_table(read_frame(tmp_path / "table.csv", hard_table.SCHEMA))
+    table = hard_table.side_layout(read_frame(tmp_path / "table.csv", hard_table.SCHEMA))
     lines = ET.fromstring(side_html(table)).findall(".//tbody/tr")
     for row, line in zip(rows, lines, strict=True):
         assert ("✗" in "".join(line[2].itertext())) == (row["naive_error"] > row["bound"])

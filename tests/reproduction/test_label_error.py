@@ -17,7 +17,8 @@ from baselines.labels.chain import chain_batches, chain_split, chain_unassisted,
 from baselines.labels.label_error import absolute_errors, relative_error, share_within, spread
 from baselines.labels.methods import METHODS, stages_of
 from reproduction.design.labels import check_sources
-from reproduction.tables.label_error import SCHEMA, label_records, write_label_error_table
+from reproduction.tables.label_error import SCHEMA, label_records
+from reproduction.tables.side import write_side_table
 from reproduction.tables.speed_vs_error import speeds_of
 from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
@@ -155,9 +156,13 @@ def results(tmp_path):
     return root, rows
 
 
+def write(rows, root, path):
+    write_side_table("label_error", design_of(rows), {}, root, path, root / "t.tex")
+
+
 def test_the_table_holds_what_was_put_into_the_labels(results):
     root, rows = results
-    write_label_error_table(design_of(rows), root, root / "tables/label_error.csv", root / "t.tex")
+    write(rows, root, root / "tables/label_error.csv")
     table = [row for _, row in read_records(root / "tables/label_error.csv", SCHEMA)]
     keys = [(row["method"], row["split"], row["assistance"]) for row in table]
     states = [(s, a) for s in ("train", "test", "total") for a in ("before", "after")]
@@ -189,7 +194,7 @@ def test_a_frame_costs_what_its_stages_took_and_each_method_has_a_row(results):
     # Two batches, the times of odometry and of the method itself, no loop closures.
     assert alone["seconds_per_frame"] == pytest.approx(2 * 2 * 2.0 / 21)
     assert alone["peak_memory_mb"] == 7.0
-    write_label_error_table(design_of(rows), root, root / "tables/label_error.csv", root / "t.tex")
+    write(rows, root, root / "tables/label_error.csv")
     found = speeds_of("labels", ["large_room", "sanctuary"], root)
     assert found.variant.tolist() == ["SfM", "RGB-D odometry alone"]
     assert found.items_per_s[0] == pytest.approx(27 / 21, rel=1e-5)
@@ -204,7 +209,7 @@ def test_facts_that_cannot_be_read_are_named(results, content):
     if content is not None:
         path.write_text(content)
     with pytest.raises(InputError, match=r"batch-000\.json: .*that batch again") as refusal:
-        write_label_error_table(design_of(rows), root, root / "t.csv", root / "t.tex")
+        write(rows, root, root / "t.csv")
     assert "\n" not in str(refusal.value)
     assert not (root / "t.csv").exists()
 

@@ -20,9 +20,9 @@ from reproduction.tables.label_ranking import (
     read_label_ranking,
     rightly_from,
     sample_of,
-    side_table,
-    write_label_ranking_table,
+    side_layout,
 )
+from reproduction.tables.side import write_side_table
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import draws
@@ -211,7 +211,8 @@ def root(tmp_path):
 
 def written(root):
     files = [root / "tables" / f"label_ranking.{end}" for end in ("csv", "tex")]
-    write_label_ranking_table(design_of(ROWS), ALONE, root, *files)
+    settings = {"references": ALONE.model_dump(mode="json")}
+    write_side_table("label_ranking", design_of(ROWS), settings, root, *files)
     return read_label_ranking(files[0])
 
 
@@ -271,7 +272,7 @@ def test_labels_rank_rightly_from_the_threshold_where_they_stay_right(tau_low, e
 
 def test_table_and_figure_show_every_label_set(root):
     table = written(root)
-    sheet = side_sheet(side_table(table))
+    sheet = side_sheet(side_layout(table))
     texts = [[cell[0].text for cell in line.cells] for line in sheet.lines]
     first, second = (dict(zip(sheet.headings, line, strict=True)) for line in texts)
     assert first["Trained on"] == "these labels"
@@ -279,7 +280,7 @@ def test_table_and_figure_show_every_label_set(root):
     assert first["Median, m"] == "1.00 (1.00 to 1.00)"
     assert second["Median, m"] == "-1.00 (-1.00 to -1.00)"
     assert second["Median, °"] == "–"
-    assert "Kendall" in side_html(side_table(table))
+    assert "Kendall" in side_html(side_layout(table))
     upper, lower = label_ranking(table, ROWS).axes
     for axes, median in ((upper, 1), (lower, -1)):
         (line, medians, *_) = [bar.lines[0] for bar in axes.containers]

@@ -5,11 +5,13 @@ import pandas as pd
 import pytest
 
 from baselines.config.learning import MODELS
-from reproduction.claims.label_shapes import shape_changes_table, side_table, write_shape_changes
+from reproduction.claims.label_shapes import shape_changes_table, side_layout
 from reproduction.design.files import Files
 from reproduction.design.jobs import jobs_of_run
 from reproduction.design.shapes import shape_rows
+from reproduction.design.side_tables import made_side_tables, needs_of
 from reproduction.tables.columns import side_sheet
+from reproduction.tables.side import write_side_table
 from tests.reproduction.test_design_files import files_of
 from tests.support.claims_results import FRAMES_OF_PATH, N_PATHS, Results, lend, rows_where
 from tests.support.report_results import design_of, experiment
@@ -99,21 +101,22 @@ def test_the_table_is_made_where_the_design_has_the_rows():
 
     made, lacking = files(rows()), files(rows()[:2])
     assert isinstance(made, Files)
-    assert jobs_of_run(made)["shape_changes"] == [{}]
-    assert len(made.compared_errors()) == len(rows()) * len(MODELS)
-    assert "shape_changes" not in jobs_of_run(lacking)
-    assert lacking.compared_errors() == []
+    assert {"side": "shape_changes"} in jobs_of_run(made)["side_table"]
+    errors = [file for file in needs_of(made, "shape_changes") if file.endswith("errors.csv")]
+    assert len(errors) == len(rows()) * len(MODELS)
+    assert "shape_changes" not in made_side_tables(lacking)
 
 
 def test_the_files_show_every_row(results, monkeypatch, tmp_path):
     lend(monkeypatch, 0.0)
     out = tmp_path / "tables" / "shape_changes"
     design = design_of(results.design)
-    write_shape_changes(design, results.root, out.with_suffix(".csv"), out.with_suffix(".tex"))
+    files = (out.with_suffix(".csv"), out.with_suffix(".tex"))
+    write_side_table("shape_changes", design, {}, results.root, *files)
     table = pd.read_csv(out.with_suffix(".csv"))
     assert len(table) == 2 * (3 + 3)
     assert table.percent[0] == pytest.approx(10)
     assert "noise: every frame has its own error" in out.with_suffix(".tex").read_text()
     fewer = table.assign(percent=-2.4, percent_low=float("nan"), percent_high=float("nan"))
-    lines = side_sheet(side_table(fewer)).lines
+    lines = side_sheet(side_layout(fewer)).lines
     assert [value.text for value in lines[0].cells[1]] == ["−2 %"]

@@ -11,6 +11,7 @@ import yaml
 from reproduction.config.load import load_config
 from reproduction.config.tables import KEYS
 from reproduction.design.experiments import read_design
+from reproduction.design.side_tables import SIDE_TABLES
 from reproduction.plan.planned import planned_text
 from reproduction.report.html import page
 from reproduction.report.summary import write_summary
@@ -198,7 +199,7 @@ def test_without_test_frames_the_printed_configuration_says_what_training_needs(
 
 @pytest.mark.parametrize("module", [assistance, label_error])
 def test_a_side_table_without_rows_is_a_heading_and_no_lines(module):
-    sheet = side_sheet(module.side_table(frame_of((), module.SCHEMA)))
+    sheet = side_sheet(module.side_layout(frame_of((), module.SCHEMA)))
     check_rowless(sheet)
 
 
@@ -226,14 +227,15 @@ def test_the_page_and_the_summary_leave_out_the_table_without_rows(
 ):
     monkeypatch.setattr(page, "room_html", lambda scene, *_: f"<p>{scene} in 3D</p>")
     design = design_of(row for row in large_room_design() if row.table != table)
-    page.write_report(design, finished, tmp_path / "report.html", with_robustness=False)
+    of_labels = {"assistance", "label_error"} if table != "table2_ground_truth" else set()
+    made = [name for name in SIDE_TABLES if name in {"references", "recall"} | of_labels]
+    page.write_report(design, finished, tmp_path / "report.html", made)
     html = (tmp_path / "report.html").read_text()
     shown = {
         name
         for name in (*KEYS, "assistance", "label_error", "robustness")
         if f'id="{name}"' in html
     }
-    of_labels = {"assistance", "label_error"} if table != "table2_ground_truth" else set()
     assert shown == {*KEYS} - {table} | of_labels
     assert "robustness.csv is missing" not in html
     assert "Without rows in this run:" in html

@@ -8,7 +8,7 @@ from reproduction.real.figures import draw_amount, draw_cover
 from reproduction.real.findings import real_findings, real_headline, real_table
 from reproduction.report.html.page import _real_table
 from reproduction.tables.columns import write_side
-from reproduction.tables.real import AMOUNT, COVER, NAME, SCHEMA, read_real, side_table
+from reproduction.tables.real import AMOUNT, COVER, NAME, SCHEMA, read_real, side_layout
 from synfeal.records.tables import frame_of, write_frame
 
 COUNTS = {"n_seeds": 3, "n_test": 500, "n_blocks": 10, "n_fused": 250, "correlation_frames": 31.0}
@@ -105,7 +105,7 @@ def test_what_renderings_are_worth_is_told_where_both_kinds_were_learned_from(ro
 
 
 def test_the_table_is_the_same_on_page_on_paper_and_in_markdown(root):
-    table = side_table(read_real(root / "tables" / f"{NAME}.csv"))
+    table = side_layout(read_real(root / "tables" / f"{NAME}.csv"))
     write_side(root / "table.tex", table)
     tex = (root / "table.tex").read_text()
     (shown,) = _real_table(root)

@@ -20,12 +20,12 @@ from reproduction.tables.columns import side_sheet
 from reproduction.tables.references import (
     crossing_finding,
     read_references,
-    side_table,
+    side_layout,
     two_digits,
-    write_references_table,
 )
 from reproduction.tables.robustness import printed
 from reproduction.tables.sheet import sheet_latex
+from reproduction.tables.side import write_side_table
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.dataset.packed import new_packed
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
@@ -75,11 +75,17 @@ def text_of(cell):
     return ", ".join(value.text for value in cell)
 
 
+def write(whole, references, root, out):
+    settings = {"references": references.model_dump(mode="json")}
+    files = (out.with_suffix(".csv"), out.with_suffix(".tex"))
+    write_side_table("references", whole, settings, root, *files)
+
+
 @pytest.fixture
 def table(root):
     out = root / "tables" / "references"
     whole = Design(rows=design(), repetitions={"default": 1})
-    write_references_table(whole, MINE, root, out.with_suffix(".csv"), out.with_suffix(".tex"))
+    write(whole, MINE, root, out)
     return read_references(out.with_suffix(".csv"))
 
 
@@ -97,7 +103,7 @@ def test_the_table_has_a_row_per_data_set_and_method_and_all_are_shown(table, ro
     assert (row.noise_m, row.noise_deg, row.kind) == (0.1, 5, "reference")
     mine = table[table.method == "mine"].iloc[0]
     assert (mine.title, mine.kind, mine.labels) == ("Mine", "external", "synfeal")
-    sheet = side_sheet(side_table(table))
+    sheet = side_sheet(side_layout(table))
     titles = [reference.title for reference in REFERENCES.values()]
     assert list(sheet.headings[2:-1]) == ["Mean training pose", *titles, "Mine"]
     lines = [
@@ -107,7 +113,7 @@ def test_the_table_has_a_row_per_data_set_and_method_and_all_are_shown(table, ro
     assert clean["Best localizer"] == "PoseNet, 0.20 m, 12°, 0 %"
     assert lines[-1][REFERENCES["structure-depth"].title] == "0 of 500"
     # On the page stand all localizers; a row in two scores has a line for each.
-    page = ET.fromstring(side_html(side_table(table)))
+    page = ET.fromstring(side_html(side_layout(table)))
     rows = page.findall(".//tbody/tr")
     assert len(page.findall(".//thead/tr/th")) == 1 + len(sheet.headings) + len(MODELS)
     assert [row.get("class") for row in rows] == [*("labels", "true") * 3, *[None] * 4]
@@ -123,7 +129,7 @@ def test_a_run_without_reference_methods_has_the_mean_pose_and_its_localizers(ta
     whole = Design(rows=design(), repetitions={"default": 1})
     out = root / "tables" / "alone"
     none = ReferencesConfig(groups=())
-    write_references_table(whole, none, root, out.with_suffix(".csv"), out.with_suffix(".tex"))
+    write(whole, none, root, out)
     alone = read_references(out.with_suffix(".csv"))
     own = table[table.method.isin({*MODELS, "constant"})]
     pd.testing.assert_frame_equal(alone, own.reset_index(drop=True))
@@ -209,7 +215,7 @@ def test_errors_are_those_of_known_answers(tmp_path):
         "posenet": 2,
         "structure-depth": 1,
     }
-    sheet = side_sheet(robustness.side_table(again))
+    sheet = side_sheet(robustness.side_layout(again))
     assert "1 of the 2 test frames" in sheet.remarks[0]
     assert [printed(v, 2) for v in (1.234, 0.1, 0.00212)] == ["1.23", "0.10", "0.0021"]
     blocks = [line.block for line in sheet.lines]

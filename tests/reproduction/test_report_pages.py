@@ -8,7 +8,6 @@ import pytest
 from baselines.config.learning import MODELS
 from reproduction.report.document import write_document
 from reproduction.report.summary import alive_sentences, findings_in, write_summary
-from reproduction.tables.assistance import write_assistance_table
 from reproduction.tables.cells import read_cells
 from reproduction.tables.sheet import (
     PAPER,
@@ -19,6 +18,7 @@ from reproduction.tables.sheet import (
     sheet_latex,
     sheet_markdown,
 )
+from reproduction.tables.side import write_side_table
 from tests.support.report_results import (
     ROWS,
     TABLE4,
@@ -103,9 +103,8 @@ def test_the_checks_presume_no_outcome(tmp_path):
 
 
 def test_assistance_counts_each_split_and_both_beside_the_papers_counts(results, tmp_path):
-    write_assistance_table(
-        design_of(shipped_design()), results, tmp_path / "a.csv", tmp_path / "a.tex"
-    )
+    files = (tmp_path / "a.csv", tmp_path / "a.tex")
+    write_side_table("assistance", design_of(shipped_design()), {}, results, *files)
     rows = read(tmp_path / "a.csv")
     assert [(r["method"], r["split"]) for r in rows[:3]] == [
         ("sfm", "train"),

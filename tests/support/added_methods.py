@@ -6,7 +6,7 @@ import re
 from tests import ROOT
 
 PAGE = ROOT / "docs" / "adding.md"
-METADATA = "Metadata-Version: 2.1\nName: my-methods\nVersion: 1.0\n"
+METADATA = "Metadata-Version: 2.1\nName: {}\nVersion: 1.0\n"
 
 
 def examples():
@@ -17,17 +17,17 @@ def examples():
     return dict(found)
 
 
-def install(folder, modules, entries=None):
+def install(folder, modules, entries=None, package="my_methods", group="synfeal.methods"):
     """Write modules by name as an installed package; returns the environment that sees it."""
-    package, info = folder / "my_methods", folder / "my_methods-1.0.dist-info"
-    package.mkdir()
+    sources, info = folder / package, folder / f"{package}-1.0.dist-info"
+    sources.mkdir()
     info.mkdir()
-    (package / "__init__.py").touch()
+    (sources / "__init__.py").touch()
     for name, text in modules.items():
-        (package / f"{name}.py").write_text(text)
-    (info / "METADATA").write_text(METADATA)
+        (sources / f"{name}.py").write_text(text)
+    (info / "METADATA").write_text(METADATA.format(package))
     if entries is None:
-        entries = "".join(f"{name} = my_methods.{name}\n" for name in modules)
-    (info / "entry_points.txt").write_text("[synfeal.methods]\n" + entries)
+        entries = "".join(f"{name} = {package}.{name}\n" for name in modules)
+    (info / "entry_points.txt").write_text(f"[{group}]\n" + entries)
     path = os.pathsep.join([str(folder), str(ROOT), os.environ.get("PYTHONPATH", "")])
     return os.environ | {"PYTHONPATH": path}

@@ -7,7 +7,7 @@ from baselines.config.learning import MODELS
 from reproduction.config.load import load_config
 from reproduction.design.experiments import Design, Experiment, read_experiments
 from reproduction.statistics.limits import COLUMNS, COMMON_COLUMNS
-from reproduction.tables.meshes import write_meshes_table
+from reproduction.tables.side import write_side_table
 from reproduction.tables.write import write_table
 from synfeal.records.files import write_json
 from synfeal.records.tables import read_records, write_frame, write_numbers
@@ -150,7 +150,7 @@ def complete_results(root):
     fill_assistance(root)
     for name in ROWS:
         make(name, design, root)
-    write_meshes_table([*SCENES], root, *table_files(root, "table1_meshes"))
+    write_side_table("table1_meshes", design, {}, root, *table_files(root, "table1_meshes"))
     return root
 
 

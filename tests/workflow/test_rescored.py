@@ -32,8 +32,11 @@ def archived(files):
         *(f"{root}/scenes/{scene}/test_depth.npy" for scene in files.scenes),
         *(f"{root}/scenes/{scene}/properties.json" for scene in files.scenes),
         *(f"{root}/scenes/{scene}/collection_speed.json" for scene in files.scenes),
-        *files.of_references("metrics.json"),
-        *files.of_references("facts.json"),
+        *(
+            f"{root}/references/{answer}/{name}.json"
+            for answer in files.reference_answers
+            for name in ("metrics", "facts")
+        ),
     ]
 
 
@@ -50,5 +53,5 @@ def test_tables_are_made_again_and_nothing_is_trained(tmp_path):
     assert run.returncode == 0, run.stdout + run.stderr
     jobs = {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", run.stdout, re.MULTILINE)}
     jobs.pop("total")
-    once = ("rescored", "table1_meshes", "table", "recall", "references_table", "document")
-    assert jobs == {**dict.fromkeys((*once, "claims", "summary"), 1), "score": 5}
+    once = ("rescored", "table", "document", "claims", "summary")
+    assert jobs == {**dict.fromkeys(once, 1), "side_table": 3, "score": 5}

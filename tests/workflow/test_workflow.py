@@ -38,7 +38,8 @@ def test_default_profile_plans_the_papers_tables(tmp_path):
     assert jobs["chain"] == 3
     assert jobs["image_references"] == 20
     assert jobs["structure_references"] == 5  # true poses, SfM's, largest noise of three blocks
-    assert jobs["table"] + jobs["table1_meshes"] == 5
+    assert jobs["table"] == 4
+    assert jobs["side_table"] == 9  # neither shapes of errors nor robustness
     assert not jobs.keys() & {"adjusted_references", "coordinate_references", "train_varied"}
 
 
@@ -52,8 +53,9 @@ def test_the_complete_profile_adds_our_own_tables(tmp_path):
     assert jobs["adjusted_references"] == 13  # those of Tables 2 and 3
     assert jobs["coordinate_references"] == 4  # simulator, largest noise of each block
     assert jobs["descriptors"] == jobs["features"] == jobs["views"] == 2
-    assert jobs["correspondences"] == jobs["tracks"] == jobs["references_table"] == 1
-    assert jobs["table"] + jobs["table1_meshes"] == 7
+    assert jobs["correspondences"] == jobs["tracks"] == jobs["robustness"] == 1
+    assert jobs["table"] == 6
+    assert jobs["side_table"] == 10
 
 
 def test_the_record_of_a_run_reads_what_every_job_took_and_all_asks_every_job_for_an_output(

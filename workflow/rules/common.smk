@@ -22,6 +22,12 @@ from reproduction.design.files import SPLITS, Files
 from reproduction.design.jobs import jobs_of_run
 from reproduction.design.labels import check_sources, estimation_parameters
 from reproduction.design.runs import training_parameters
+from reproduction.design.side_tables import (
+    SIDE_TABLES,
+    code_of,
+    made_side_tables,
+    needs_of,
+)
 from reproduction.runs.renamed import refuse_old_names
 from synfeal.config.effects import CLEAN, MIXED
 from synfeal.config.load import read_yaml

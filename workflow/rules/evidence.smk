@@ -1,23 +1,13 @@
 # Tables, figures and the summary: they read result files and compute nothing upstream.
 
-
-rule table1_meshes:
-    input:
-        properties=under("scenes/{scene}/properties.json", scene=FILES.scenes),
-    output:
-        **table_files("table1_meshes"),
-    log:
-        f"{ROOT}/logs/tables/table1_meshes.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/table1_meshes.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
-    params:
-        scenes=FILES.scenes,
-    script:
-        "../scripts/run_table1_meshes.py"
+# Side tables that this profile has rows for; those that the document, the summary and figures show.
+MADE = made_side_tables(FILES)
+SUMMARISED = [name for name in MADE if SIDE_TABLES[name].in_summary]
+DOCUMENTED = [name for name in MADE if SIDE_TABLES[name].in_document]
+DOCUMENTED[1:1] = FILES.tables  # Table 1 stands before those of the design
+DRAWN = {"label_ranking", "speed_vs_error"}.intersection(MADE)
+if FILES.drawn_tables:
+    DRAWN |= {"references", "robustness"}.intersection(MADE)
 
 
 rule table:
@@ -45,182 +35,35 @@ rule table:
         "../scripts/run_table.py"
 
 
-rule references_table:
+# Tables beside those of the design, each declared where it is made; another one needs no rule.
+rule side_table:
     input:
-        metrics=FILES.of_references("metrics.json"),
-        facts=FILES.of_references("facts.json"),
-        localizers=FILES.of_runs("metrics.json"),
+        lambda w: needs_of(FILES, w.side),
     output:
-        **table_files("references"),
+        **table_files("{side}"),
     log:
-        f"{ROOT}/logs/tables/references.log",
+        f"{ROOT}/logs/tables/{{side}}.log",
     benchmark:
-        f"{ROOT}/benchmarks/tables/references.tsv"
+        f"{ROOT}/benchmarks/tables/{{side}}.tsv"
+    wildcard_constraints:
+        side="|".join(SIDE_TABLES),
     conda:
         "../envs/synfeal.yaml"
     resources:
-        mem_mb=grown(1000),
+        mem_mb=lambda w, attempt: attempt * SIDE_TABLES[w.side].mem_mb,
     params:
         design=dump(DESIGN),
-        references=dump(CONFIG.references),
+        settings=lambda w: {
+            key: dump(getattr(CONFIG, key)) for key in SIDE_TABLES[w.side].settings
+        },
+        code=lambda w: code_of(w.side),  # read by nothing: a table whose code changed is made anew
     script:
-        "../scripts/run_references_table.py"
-
-
-rule label_ranking:
-    input:
-        predictions=FILES.ranked_predictions(),
-        labels=FILES.ranking_labels(),
-    output:
-        **table_files("label_ranking"),
-    log:
-        f"{ROOT}/logs/tables/label_ranking.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/label_ranking.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
-    params:
-        design=dump(DESIGN),
-        references=dump(CONFIG.references),
-    script:
-        "../scripts/run_label_ranking.py"
-
-
-rule shape_changes:
-    input:
-        errors=FILES.compared_errors(),
-        labels=under("labels/{set}/{split}.csv", set=FILES.true_sets, split=SPLITS),
-    output:
-        **table_files("shape_changes"),
-    log:
-        f"{ROOT}/logs/tables/shape_changes.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/shape_changes.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
-    params:
-        design=dump(DESIGN),
-    script:
-        "../scripts/run_shape_changes.py"
-
-
-rule recall:
-    input:
-        metrics=FILES.of_runs("metrics.json"),
-    output:
-        **table_files("recall"),
-    log:
-        f"{ROOT}/logs/tables/recall.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/recall.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
-    params:
-        design=dump(DESIGN),
-    script:
-        "../scripts/run_recall.py"
-
-
-rule assistance:
-    input:
-        records=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
-    output:
-        **table_files("assistance"),
-    log:
-        f"{ROOT}/logs/tables/assistance.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/assistance.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
-    params:
-        design=dump(DESIGN),
-    script:
-        "../scripts/run_assistance.py"
-
-
-rule label_error:
-    input:
-        labels=under("labels/{set}/{split}.csv", set=FILES.pose_sets, split=SPLITS),
-        unassisted=under(
-            "labels/{set}/{split}-unassisted.csv",
-            set=FILES.estimated_sets,
-            split=SPLITS,
-        ),
-        records=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
-        facts=FILES.batch_facts(),
-    output:
-        **table_files("label_error"),
-    log:
-        f"{ROOT}/logs/tables/label_error.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/label_error.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
-    params:
-        design=dump(DESIGN),
-    script:
-        "../scripts/run_label_error.py"
-
-
-rule speed_vs_error:
-    input:
-        curves=under("scenes/{scene}/collision_curve.csv", scene=FILES.scenes),
-        rendering=under("scenes/{scene}/render_speed.csv", scene=FILES.scenes),
-        labels=under(
-            "tables/{t}.csv", t={"label_error"}.intersection(FILES.label_tables)
-        ),
-        trainings=under("tables/{t}.csv", t={"table4_size"}.intersection(FILES.tables)),
-        histories=under("runs/{run}/history.csv", run=FILES.runs_of("table4_size")),
-        effects=FILES.drawn_robustness(),
-        measured=under("benchmarks/train/{run}.tsv", run=FILES.runs_of("table4_size")),
-    output:
-        csv=f"{ROOT}/tables/speed_vs_error.csv",
-    log:
-        f"{ROOT}/logs/tables/speed_vs_error.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/speed_vs_error.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(1000),
-    params:
-        scenes=FILES.scenes,
-    script:
-        "../scripts/run_speed_vs_error.py"
-
-
-rule hard_cases:
-    output:
-        csv=f"{ROOT}/tables/hard_cases.csv",
-    log:
-        f"{ROOT}/logs/tables/hard_cases.log",
-    benchmark:
-        f"{ROOT}/benchmarks/tables/hard_cases.tsv"
-    conda:
-        "../envs/synfeal.yaml"
-    resources:
-        mem_mb=grown(2000),
-    script:
-        "../scripts/run_hard_cases.py"
+        "../scripts/run_side_table.py"
 
 
 rule document:
     input:
-        tables=[
-            *under("tables/{t}.tex", t=[*FILES.tables, "references", "recall"]),
-            *under("tables/{t}.tex", t=[*FILES.ranking_tables, *FILES.shape_tables]),
-            *FILES.robustness_tables("tex"),
-        ],
+        tables=under("tables/{t}.tex", t=DOCUMENTED),
     output:
         tex=f"{ROOT}/tables/all_tables.tex",
     log:
@@ -238,10 +81,8 @@ rule document:
 rule figures:
     input:
         tables=under("tables/{table}.csv", table=FILES.drawn_tables),
-        references=rules.references_table.output.csv if FILES.drawn_tables else [],
-        robustness=FILES.drawn_robustness(),
-        ranking=under("tables/{t}.csv", t=FILES.ranking_tables),
-        speed=rules.speed_vs_error.output.csv,
+        sides=under("tables/{t}.csv", t=sorted(DRAWN)),
+        effects_speed=FILES.effects_speed(),
         labels=under("labels/{set}/{split}.csv", set=FILES.pose_sets, split=SPLITS),
         assistance=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
         errors=under("runs/{run}/errors.csv", run=FILES.runs_of("table4_size")),
@@ -266,10 +107,7 @@ rule figures:
 rule summary:
     input:
         metrics=FILES.of_runs("metrics.json"),
-        references=rules.references_table.output.csv,
-        recall=rules.recall.output.csv,
-        robustness=FILES.robustness_tables(),
-        properties=rules.table1_meshes.input.properties,
+        sides=under("tables/{t}.csv", t=SUMMARISED),
     output:
         md=f"{ROOT}/summary.md",
     log:
@@ -293,7 +131,7 @@ rule claims:
         labels=under("labels/{set}/{split}.csv", set=FILES.true_sets, split=SPLITS),
         estimated=under("labels/{set}/train.csv", set=FILES.estimated_sets),
         assistance=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
-        properties=rules.table1_meshes.input.properties,
+        properties=under("scenes/{scene}/properties.json", scene=FILES.scenes),
         speed=under("scenes/{scene}/collection_speed.json", scene=FILES.scenes),
     output:
         csv=f"{ROOT}/claims.csv",
@@ -314,14 +152,7 @@ rule claims:
 
 # Files that the record has hashes of, and the report shows.
 RESULTS = [
-    *under("tables/{table}.csv", table=FILES.tables),
-    rules.speed_vs_error.output.csv,
-    rules.hard_cases.output.csv,
-    *under("tables/{table}.csv", table=FILES.label_tables),
-    rules.references_table.output.csv,
-    rules.recall.output.csv,
-    *under("tables/{table}.csv", table=[*FILES.ranking_tables, *FILES.shape_tables]),
-    *FILES.robustness_tables(),
+    *under("tables/{table}.csv", table=[*FILES.tables, *MADE]),
     rules.figures.output.dir,
     rules.summary.output.md,
     rules.claims.output.csv,
@@ -370,6 +201,6 @@ rule report:
         mem_mb=grown(4000),
     params:
         design=dump(DESIGN),
-        with_robustness=FILES.has_robustness,
+        side_tables=MADE,
     script:
         "../scripts/run_report.py"

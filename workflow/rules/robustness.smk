@@ -178,11 +178,11 @@ rule robustness:
         ),
         labels=expand(f"{ROOT}/labels/{FILES.robust_set}/{{split}}.csv", split=SPLITS),
     output:
-        **table_files("robustness"),
+        csv=f"{VARIED}/{ROBUST_SCENE}.csv",
     log:
-        f"{ROOT}/logs/tables/robustness.log",
+        f"{ROOT}/logs/robustness.log",
     benchmark:
-        f"{ROOT}/benchmarks/tables/robustness.tsv"
+        f"{ROOT}/benchmarks/robustness.tsv"
     conda:
         "../envs/synfeal.yaml"
     resources:

@@ -11,5 +11,5 @@ run_job(
     design=snakemake.params.design,
     root=Path(snakemake.output.html).parent,
     out_html=snakemake.output.html,
-    with_robustness=snakemake.params.with_robustness,
+    side_tables=snakemake.params.side_tables,
 )

@@ -1,11 +1,11 @@
-"""Measure and write the table."""
+"""Measure how well methods stand effects: rows of the robustness table."""
 
 from reproduction.runs.job import run_job
-from reproduction.tables.robustness import write_robustness_table
+from reproduction.tables.robustness import write_robustness_scores
 
 run_job(
     snakemake.log[0],
-    write_robustness_table,
+    write_robustness_scores,
     clean=snakemake.input.clean,
     mixed=snakemake.input.mixed,
     descriptors=snakemake.input.descriptors,
@@ -16,5 +16,4 @@ run_job(
     effects=snakemake.params.effects,
     device=snakemake.params.device,
     out_csv=snakemake.output.csv,
-    out_tex=snakemake.output.tex,
 )

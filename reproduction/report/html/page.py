@@ -15,14 +15,11 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from PIL import Image
 
-from reproduction.claims import label_shapes
 from reproduction.claims.verdicts import Verdict
 from reproduction.config.tables import KEYS
 from reproduction.design.experiments import Design, Experiment
-from reproduction.design.ranking import ranked_sets
-from reproduction.design.shapes import shape_rows
+from reproduction.design.side_tables import SIDE_TABLES
 from reproduction.figures.registry import CAPTIONS
-from reproduction.hard_cases import table as hard_cases
 from reproduction.report.findings import can_tell, findings
 from reproduction.report.findings_figure import panels, picture
 from reproduction.report.html.provenance import cost_sentence, origin_html, read_origin
@@ -36,25 +33,15 @@ from reproduction.report.html.tables import (
     verdict_table,
 )
 from reproduction.report.summary import run_sentences
-from reproduction.tables import (
-    assistance,
-    label_error,
-    label_ranking,
-    meshes,
-    real,
-    recall,
-    references,
-    robustness,
-    speed_vs_error,
-)
+from reproduction.tables import meshes, real
 from reproduction.tables.cells import key_of, published_cells, read_cells
 from reproduction.tables.layouts import BLOCKS, SOURCES, scene_title
+from reproduction.tables.side import read_side_table
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.inspection.surface import SurfacePoints, viewer_js, viewer_mesh
 from synfeal.mesh.load import load_mesh
 from synfeal.records.files import write_text
 from synfeal.records.provenance import generator_of
-from synfeal.records.tables import read_frame
 
 LARGEST_SVG = 1_000_000  # bytes; clouds of points are smaller as a picture
 LARGEST_PNG = 250_000
@@ -93,40 +80,29 @@ REAL_CAPTIONS = {
     " rendered frames, and against the number of photographs that were scanned.",
     "real_cover": "The same errors against the share of a photograph that the scan covers.",
 }
-# Modules of the tables that follow tables 1 to 7.
-SIDE_TABLES: Sequence[Any] = (
-    references,
-    recall,
-    robustness,
-    assistance,
-    label_error,
-    label_ranking,
-    label_shapes,
-    speed_vs_error,
-    hard_cases,
-)
 
 
-def write_report(design: Design, root: Path, out_html: Path, with_robustness: bool = True) -> None:
+def write_report(
+    design: Design, root: Path, out_html: Path, side_tables: Sequence[str] = tuple(SIDE_TABLES)
+) -> None:
     """Write the page, one file that opens without a network.
 
-    Without claims, provenance or figures, their sections say so. Tables for which the design has
-    no rows are left out, and named under what is not here.
+    Without claims, provenance or figures, their sections say so. Side tables that the run has no
+    rows for are left out, and named under what is not here.
 
     Args:
         design: What was run.
         root: Results of the profile.
         out_html: File to write.
-        with_robustness: Whether the robustness table has rows.
+        side_tables: Side tables that the run has rows for.
     """
-    rowless = rowless_tables(design, with_robustness)
-    sides = [module for module in SIDE_TABLES if module.NAME not in rowless]
+    rowless = [name for name in SIDE_TABLES if name not in side_tables]
     cells = {table: read_cells(table, design, root) for table in design.tables}
     claims = read_claims(root / CLAIMS) if (root / CLAIMS).exists() else []
     origin = read_origin(root / PROVENANCE) if (root / PROVENANCE).exists() else {}
     figures = figure_files(root / "figures", CAPTIONS)
     figures |= figure_files(root.with_name(REAL) / "figures", REAL_CAPTIONS)
-    files = (CLAIMS, PROVENANCE, *(f"tables/{m.NAME}.csv" for m in (meshes, *sides)))
+    files = (CLAIMS, PROVENANCE, *(f"tables/{name}.csv" for name in side_tables))
     page = render(
         "page.html",
         profile=root.name,
@@ -135,7 +111,7 @@ def write_report(design: Design, root: Path, out_html: Path, with_robustness: bo
         sentences=[*run_sentences(cells), *([cost_sentence(origin)] if origin else [])],
         counts=verdict_table(claims) if claims else "",
         claims=claims_table(claims) if claims else "",
-        tables=[*_tables(cells, sides, root), *_real_table(root.with_name(REAL))],
+        tables=[*_tables(cells, side_tables, root), *_real_table(root.with_name(REAL))],
         figures=[
             {
                 "name": name,
@@ -178,35 +154,24 @@ def opening(root: Path) -> str:
     return f"data:image/png;base64,{content}"
 
 
-def rowless_tables(design: Design, with_robustness: bool) -> list[str]:
-    """List side tables for which a design has no rows.
-
-    Those of estimated labels, of what inexact labels rank, of label errors by their shape, and of
-    frames with effects.
-    """
-    of_labels = [] if design.estimated else [assistance.NAME, label_error.NAME]
-    of_labels += [] if ranked_sets(design) else [label_ranking.NAME]
-    of_labels += [] if shape_rows(design.rows) else [label_shapes.NAME]
-    return [*of_labels, *([] if with_robustness else [robustness.NAME])]
-
-
 def _tables(
-    cells: Mapping[str, pd.DataFrame], sides: Sequence[Any], root: Path
+    cells: Mapping[str, pd.DataFrame], side_tables: Sequence[str], root: Path
 ) -> Iterator[dict[str, Any]]:
     """Yield name, title and HTML of every table; no HTML where its file is missing."""
-    for module in (meshes, *sides):
-        path = root / "tables" / f"{module.NAME}.csv"
-        body = path.exists() and side_html(module.side_table(read_frame(path, module.SCHEMA)))
-        yield {"name": module.NAME, "title": table_title(module.NAME), "body": body}
-        for name, scores in cells.items() if module is meshes else ():
-            yield {"name": name, "title": table_title(name), "body": score_table(name, scores)}
+    for name in side_tables:
+        path = root / "tables" / f"{name}.csv"
+        body = path.exists() and side_html(read_side_table(name, path)[1])
+        yield {"name": name, "title": table_title(name), "body": body}
+        for design_table, scores in cells.items() if name == meshes.NAME else ():
+            body = score_table(design_table, scores)
+            yield {"name": design_table, "title": table_title(design_table), "body": body}
 
 
 def _real_table(root: Path) -> Iterator[dict[str, Any]]:
     """Yield the table of `make real`, where that was run."""
     path = root / "tables" / f"{real.NAME}.csv"
     if path.exists():
-        body = side_html(real.side_table(real.read_real(path)))
+        body = side_html(real.side_layout(real.read_real(path)))
         yield {"name": real.NAME, "title": table_title(real.NAME), "body": body}
 
 

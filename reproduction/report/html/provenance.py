@@ -15,7 +15,7 @@ from reproduction.plan.text import duration
 from reproduction.report.html.tables import render, side_html
 from reproduction.runs.job_times import read_jobs, write_measured
 from reproduction.runs.results import read_result, shaped
-from reproduction.tables.columns import Column, SideTable
+from reproduction.tables.columns import Column, SideLayout
 from synfeal.records.files import file_sha256, write_json
 from synfeal.records.provenance import CPU_INFO, processor_name, provenance
 from synfeal.records.tables import records_of
@@ -135,7 +135,7 @@ def origin_html(record: Record) -> Markup:
     stages["median"] = stages.median_seconds.map(duration)
     caption = "Time and largest resident memory of the jobs of each stage."
     return render(
-        "origin.html", record=record, stages=side_html(SideTable("cost", caption, columns, stages))
+        "origin.html", record=record, stages=side_html(SideLayout("cost", caption, columns, stages))
     )
 
 

@@ -15,7 +15,8 @@ from markupsafe import Markup
 from reproduction.claims.table import COLUMNS, verdict_counts
 from reproduction.claims.verdicts import GROUPS, MEANINGS, Verdict
 from reproduction.design.experiments import FROM_SCRATCH
-from reproduction.tables.columns import SCORES, Column, SideTable, cells_of
+from reproduction.design.side_tables import SIDE_TABLES
+from reproduction.tables.columns import SCORES, Column, SideLayout, cells_of
 from reproduction.tables.layouts import CHANGE
 from reproduction.tables.sheet import PAPER, Line, Value, footnotes
 from reproduction.tables.write import one_run_remarks, sheet_of
@@ -36,7 +37,7 @@ def render(template: str, **values: Any) -> Markup:
     return Markup(ENVIRONMENT.get_template(template).render(**values))
 
 
-def side_html(table: SideTable) -> Markup:
+def side_html(table: SideLayout) -> Markup:
     """Format a side table, a row per row."""
     rows = [
         {"style": row.get("style", ""), "cells": [cells_of(row, c) for c in table.columns]}
@@ -110,6 +111,8 @@ def _row(lines: Sequence[Line]) -> dict[str, Any]:
 
 def table_title(name: str) -> str:
     """Title a table as in ``Table 4`` or ``Label error``."""
+    if name in SIDE_TABLES:
+        return SIDE_TABLES[name].title
     found = re.match(r"table(\d+)", name)
     return f"Table {found[1]}" if found else name.replace("_", " ").capitalize()
 
