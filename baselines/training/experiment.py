@@ -8,12 +8,12 @@ where predictions are made, of the poses in memory; those of an archive's predic
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from baselines.config.learning import ModelName
-from baselines.training.run import train_and_predict
+from baselines.training.run import CommonTest, RunFiles, SplitFiles, train_and_predict
 from baselines.training.score import score_common_poses, score_poses
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
@@ -21,27 +21,36 @@ from synfeal.errors import InputError
 from synfeal.evaluation.reprojection import read_cell_depth
 
 
+class Scoring(NamedTuple):
+    """What predictions are scored by, and the files with their scores.
+
+    Attributes:
+        truth: True poses of the test frames.
+        depth: Depth that the test frames show, for the reprojection error.
+        camera: Camera of the frames, for the reprojection error.
+        wildcards: Names of the run, which are copied into its metrics.
+        out_errors: Errors of the test frames to write.
+        out_common_errors: Errors on the common test set to write.
+        out_metrics: Scores to write.
+    """
+
+    truth: Path
+    depth: Path
+    camera: CameraConfig
+    wildcards: dict[str, str]
+    out_errors: Path
+    out_common_errors: Path
+    out_metrics: Path
+
+
 def train_and_score(
     model: ModelName,
-    frames: Path,
-    labels: Path,
-    test_frames: Path,
-    test_labels: Path,
+    train: SplitFiles,
+    test: SplitFiles,
+    common: CommonTest,
     run: dict[str, Any],
-    truth: Path,
-    depth: Path,
-    camera: CameraConfig,
-    common: Path,
-    every: int,
-    wildcards: dict[str, str],
-    out_model: Path,
-    out_history: Path,
-    out_record: Path,
-    out_predictions: Path,
-    out_common: Path,
-    out_errors: Path | None = None,
-    out_common_errors: Path | None = None,
-    out_metrics: Path | None = None,
+    out: RunFiles,
+    scoring: Scoring | None = None,
     weights: Path | None = None,
 ) -> None:
     """Train a localizer, predict its test frames, and score the predictions.
@@ -51,60 +60,35 @@ def train_and_score(
 
     Args:
         model: Name of the localizer.
-        frames: Packed training frames.
-        labels: Poses of the training frames, as the data set labels them.
-        test_frames: Packed test frames.
-        test_labels: Poses of the test frames, as the data set labels them.
-        run: Settings of the run; see :func:`reproduction.design.runs.training_parameters`.
-        truth: True poses of the test frames.
-        depth: Depth that the test frames show, for the reprojection error.
-        camera: Camera of the frames, for the reprojection error.
-        common: True poses of the common test set.
-        every: Predict the first of each so many frames of the common test set.
-        wildcards: Names of the run, which are copied into its metrics.
-        out_model: Checkpoint to write.
-        out_history: CSV of the losses to write.
-        out_record: Record to write of what the run was trained from.
-        out_predictions: Predicted poses of the test frames to write.
-        out_common: Predicted poses of the common test set to write.
-        out_errors: Errors of the test frames to write; None scores nothing.
-        out_common_errors: Errors on the common test set to write.
-        out_metrics: Scores to write.
+        train: Frames to learn from, and their labels.
+        test: Frames to predict, and their labels.
+        common: The common test set, to predict as well.
+        run: Settings of the run, as :func:`baselines.training.run.train_and_predict` takes them.
+        out: Files of the run to write.
+        scoring: What predictions are scored by; None scores nothing.
         weights: State dict that the backbone starts from; None trains from scratch.
 
     Raises:
         InputError: a file cannot be used.
     """
-    true = read_scorable(test_labels, truth, depth) if out_errors else None
-    test, on_common = train_and_predict(
-        model=model,
-        frames=frames,
-        labels=labels,
-        test_frames=test_frames,
-        test_labels=test_labels,
-        run=run,
-        out_model=out_model,
-        out_history=out_history,
-        out_record=out_record,
-        out_predictions=out_predictions,
-        weights=weights,
-        common=common,
-        every=every,
-        out_common=out_common,
+    true = read_scorable(test.labels, scoring.truth, scoring.depth) if scoring else None
+    own, on_common = train_and_predict(
+        model=model, train=train, test=test, run=run, out=out, weights=weights, common=common
     )
-    if true is not None and out_errors and out_metrics:
-        score_poses(
-            predicted=test.predicted,
-            labels=test.given,
-            truth=true,
-            train=read_pose_table(labels),
-            out_errors=out_errors,
-            out_metrics=out_metrics,
-            info=wildcards,
-            depth=(depth, camera),
-        )
-    if on_common is not None and out_common_errors:
-        score_common_poses(on_common.predicted, on_common.given, out_common_errors)
+    if scoring is None or true is None:
+        return
+    score_poses(
+        predicted=own.predicted,
+        labels=own.given,
+        truth=true,
+        train=read_pose_table(train.labels),
+        out_errors=scoring.out_errors,
+        out_metrics=scoring.out_metrics,
+        info=scoring.wildcards,
+        depth=(scoring.depth, scoring.camera),
+    )
+    if on_common is not None:
+        score_common_poses(on_common.predicted, on_common.given, scoring.out_common_errors)
 
 
 def read_scorable(labels: Path, truth: Path, depth: Path) -> PoseTable:

@@ -320,61 +320,93 @@ class Answers(NamedTuple):
     common: Predictions | None = None
 
 
+class SplitFiles(NamedTuple):
+    """Packed frames of a split, and their poses as the data set labels them.
+
+    Attributes:
+        frames: Packed frames, the first of which are those of ``labels``.
+        labels: Pose table.
+    """
+
+    frames: Path
+    labels: Path
+
+
+class CommonTest(NamedTuple):
+    """Test frames that localizers of all sizes answer, beside their own.
+
+    Attributes:
+        truth: Their true poses, a pose table.
+        every: The first of each so many of its frames is predicted.
+        out: Predicted poses to write.
+    """
+
+    truth: Path
+    every: int
+    out: Path
+
+
+class RunFiles(NamedTuple):
+    """Files that a training run writes.
+
+    Attributes:
+        model: Checkpoint.
+        history: CSV of the losses.
+        record: JSON of what the run was trained from.
+        predictions: Predicted poses of the test frames.
+    """
+
+    model: Path
+    history: Path
+    record: Path
+    predictions: Path
+
+
 def train_and_predict(
     model: ModelName,
-    frames: Path,
-    labels: Path,
-    test_frames: Path,
-    test_labels: Path,
+    train: SplitFiles,
+    test: SplitFiles,
     run: dict[str, Any],
-    out_model: Path,
-    out_history: Path,
-    out_record: Path,
-    out_predictions: Path,
+    out: RunFiles,
     weights: Path | None = None,
-    common: Path | None = None,
-    every: int = 1,
-    out_common: Path | None = None,
+    common: CommonTest | None = None,
 ) -> Answers:
     """Train a localizer, and predict the test frames it is scored on.
 
     Args:
         model: Name of the localizer.
-        frames: Packed frames to learn from, the first of which are those of ``labels``.
-        labels: Their poses.
-        test_frames: Packed frames of the test set.
-        test_labels: Their poses, of which only the frames are read, but by a published protocol.
-        run: Settings as :func:`reproduction.design.runs.training_parameters` gives them.
-        out_model: Checkpoint.
-        out_history: Losses.
-        out_record: Record to write of what the run was trained from.
-        out_predictions: Poses of the test frames.
+        train: Frames to learn from.
+        test: Frames to predict; of their labels only the frames are read, but by a published
+            protocol.
+        run: Settings of the run: ``training``, ``network``, ``localizer``, ``samples_seen`` and
+            ``seed``, ready for JSON.
+        out: Files to write.
         weights: State dict that the backbone starts from; without, from scratch.
-        common: Pose table of the common test set, of whose frames one in ``every`` is predicted.
-        every: Distance in frames between those of the common test set that are predicted.
-        out_common: Poses of the common test set.
+        common: Common test set to predict as well.
 
     Returns:
         The predictions.
     """
-    inputs = {"frames": frames, "labels": labels, "test_frames": test_frames}
-    inputs |= {"test_labels": test_labels} | ({"weights": weights} if weights else {})
+    inputs = {"frames": train.frames, "labels": train.labels}
+    inputs |= {"test_frames": test.frames, "test_labels": test.labels}
+    inputs |= {"weights": weights} if weights else {}
     training = TrainingConfig(**run["training"], samples_seen={})
     network, hyper = NetworkConfig(**run["network"]), hyper_of(model)(**run["localizer"])
     job = Job(model, network, hyper, training, run["samples_seen"], run["seed"])
     trained = train_localizer(
         job=job,
-        frames=frames,
-        labels=labels,
-        out_model=out_model,
-        out_history=out_history,
+        frames=train.frames,
+        labels=train.labels,
+        out_model=out.model,
+        out_history=out.history,
         weights=weights,
-        test=(test_frames, test_labels),
+        test=test,
     )
-    write_training_record(out_record, run, inputs)
-    test = write_predictions(trained.localizer, test_frames, test_labels, out_predictions)
-    if not (common and out_common):
-        return Answers(test)
+    write_training_record(out.record, run, inputs)
+    own = write_predictions(trained.localizer, test.frames, test.labels, out.predictions)
+    if common is None:
+        return Answers(own)
     return Answers(
-        test, write_predictions(trained.localizer, test_frames, common, out_common, every)
+        own,
+        write_predictions(trained.localizer, test.frames, common.truth, common.out, common.every),
     )

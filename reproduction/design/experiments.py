@@ -14,6 +14,7 @@ from baselines.config.learning import MODELS, ModelName
 from baselines.labels.injected import LABEL_ERRORS, moved_m
 from reproduction.config.profile import Config
 from reproduction.config.tables import DEFAULT, KEYS, Repetitions, TableName
+from reproduction.design.label_sets import LabelSet
 from synfeal.config.load import describe
 from synfeal.config.types import NonNegative, Strict
 from synfeal.errors import InputError
@@ -86,9 +87,7 @@ class Experiment(Strict):
     @property
     def label_id(self) -> str:
         """Directory name of the label set, e.g. ``sfm`` or ``noise-p0.1-r5``."""
-        if self.labels not in INJECTED:
-            return self.labels
-        return f"{self.labels}-p{self.noise_m:g}-r{self.noise_deg:g}"
+        return str(LabelSet(self.labels, self.noise_m, self.noise_deg))
 
     @property
     def pretrained(self) -> Experiment:

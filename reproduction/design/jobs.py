@@ -16,6 +16,7 @@ from baselines.references.registry import in_group
 from baselines.registry.kinds import Group
 from reproduction.design.experiments import INJECTED
 from reproduction.design.files import SPLITS, Files
+from reproduction.design.label_sets import INJECTED_PATTERN
 from reproduction.design.references import DataSet
 from reproduction.design.side_tables import made_side_tables
 from synfeal.config.effects import CLEAN, MIXED
@@ -27,7 +28,7 @@ _BATCH = "{scene}/{size}/{split}/batch-{batch}"
 MEASUREMENTS = {
     "detail": "detail/{scene}/detail_{camera}",
     "true_labels": "labels/{scene}/{size}/synfeal/{split}",
-    "erroneous_labels": "labels/{scene}/{size}/{error_kind}-p{noise_m}-r{noise_deg}/{split}",
+    "erroneous_labels": f"labels/{{scene}}/{{size}}/{INJECTED_PATTERN}/{{split}}",
     "sfm": f"sfm/{_BATCH}",
     "rgbd": f"rgbd/{_BATCH}",
     "estimate": f"{{frame_method}}/{_BATCH}",

@@ -14,10 +14,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import pandas as pd
 
+from baselines.labels.methods import SIMULATOR
 from reproduction.claims.label_shapes import NAME as SHAPE_CHANGES
 from reproduction.claims.label_shapes import SCHEMA as SHAPES_SCHEMA
 from reproduction.claims.rules import frozen_rules
 from reproduction.claims.verdicts import GROUPS
+from reproduction.design.label_sets import LabelSet
 from reproduction.design.profiles import read_profile
 from reproduction.design.shapes import SHAPES, largest_in_all_shapes
 from reproduction.design.shapes import TABLE as SHAPES_ROWS
@@ -140,7 +142,7 @@ def reference(root: Path, method: str, noise: tuple[float, float] = (0.0, 0.0)) 
         The method's row; None where it was not run or has no score.
     """
     rows = read_table(root, "references", REFERENCES)
-    labels = "synfeal" if noise == (0.0, 0.0) else f"noise-p{noise[0]:g}-r{noise[1]:g}"
+    labels = str(LabelSet("noise", *noise)) if any(noise) else SIMULATOR
     chosen = (rows.scene == ROOM) & (rows["size"] == SMALL) & (rows.labels == labels)
     found = rows_of(rows[chosen & (rows.method == method) & rows.position_m_true.notna()])
     return found[0] if found else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import pandas as pd
@@ -11,6 +10,7 @@ from baselines.config.learning import LOCALIZERS
 from baselines.labels.injected import LABEL_ERRORS
 from baselines.labels.methods import METHODS, SIMULATOR
 from reproduction.design.experiments import FROM_SCRATCH, split_init
+from reproduction.design.label_sets import LabelSet
 
 TITLES = {name: kind.title for name, kind in LOCALIZERS.items()}
 SOURCES = {**{name: method.title for name, method in METHODS.items()}, "synfeal": "Synfeal"}
@@ -86,8 +86,10 @@ def data_set_titles(table: pd.DataFrame) -> pd.Series:
 
 def label_title(labels: str) -> str:
     """Title a label set as tables do: ``noise-p0.1-r5`` is noise 0.1 m, 5°."""
-    found = re.fullmatch(r"([\w-]+)-p([\d.]+)-r([\d.]+)", labels)
-    return f"{found[1]} {found[2]} m, {found[3]}°" if found else SOURCES.get(labels, labels)
+    named = LabelSet.parse(labels)
+    if not named.is_injected:
+        return SOURCES.get(labels, labels)
+    return f"{named.source} {named.noise_m:g} m, {named.noise_deg:g}°"
 
 
 def row_label(name: str, cell: Any) -> str:

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from baselines.training.experiment import train_and_score
+from baselines.training.experiment import Scoring, train_and_score
 from baselines.training.predict import predict_poses
+from baselines.training.run import CommonTest, RunFiles, SplitFiles
 from baselines.training.score import write_scores
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import InputError
@@ -31,76 +32,79 @@ def files(tmp_path):
     }
     return {
         "model": "posenet2",
-        "frames": frames,
-        "labels": labels,
-        "test_frames": test_frames,
-        "test_labels": test_labels,
+        "train": SplitFiles(frames, labels),
+        "test": SplitFiles(test_frames, test_labels),
         "run": run,
-        "truth": test_labels,
-        "depth": depth,
-        "camera": CAMERA,
-        "common": test_labels,
-        "every": 2,
-        "wildcards": WILDCARDS,
     }
 
 
-def outputs(folder):
-    names = ("predictions", "common", "errors", "common_errors", "history")
-    paths = {f"out_{name}": folder / f"{name}.csv" for name in names}
-    return paths | {
-        "out_model": folder / "model.pt",
-        "out_record": folder / "training.json",
-        "out_metrics": folder / "metrics.json",
+def outputs(folder, test, depth):
+    """Objects that a run in a folder is given, by argument."""
+    return {
+        "common": CommonTest(test.labels, 2, folder / "common.csv"),
+        "out": RunFiles(
+            model=folder / "model.pt",
+            history=folder / "history.csv",
+            record=folder / "training.json",
+            predictions=folder / "predictions.csv",
+        ),
+        "scoring": Scoring(
+            truth=test.labels,
+            depth=depth,
+            camera=CAMERA,
+            wildcards=WILDCARDS,
+            out_errors=folder / "errors.csv",
+            out_common_errors=folder / "common_errors.csv",
+            out_metrics=folder / "metrics.json",
+        ),
     }
 
 
-def test_scores_are_those_of_the_stored_predictions(files, tmp_path):
-    first, again = tmp_path / "run", tmp_path / "again"
-    first.mkdir()
-    again.mkdir()
-    made, scored = outputs(first), outputs(again)
-    train_and_score(**files, **made)
-    write_scores(
-        predictions=made["out_predictions"],
-        labels=files["test_labels"],
-        truth=files["truth"],
-        train_labels=files["labels"],
-        depth=files["depth"],
-        camera=CAMERA,
-        common=made["out_common"],
-        common_truth=files["common"],
-        wildcards=WILDCARDS,
-        **{name: scored[name] for name in ("out_errors", "out_metrics", "out_common_errors")},
-    )
-    for name in ("out_errors", "out_metrics", "out_common_errors"):
-        assert made[name].read_bytes() == scored[name].read_bytes()
-
-
-def test_predictions_are_those_of_the_checkpoint(files, tmp_path):
+@pytest.fixture
+def made(files, tmp_path):
     (tmp_path / "run").mkdir()
-    made = outputs(tmp_path / "run")
+    return outputs(tmp_path / "run", files["test"], tmp_path / "depth.npy")
+
+
+def test_scores_are_those_of_the_stored_predictions(files, made, tmp_path):
+    (tmp_path / "again").mkdir()
+    scored = outputs(tmp_path / "again", files["test"], tmp_path / "depth.npy")["scoring"]
+    train_and_score(**files, **made)
+    names = ("out_errors", "out_metrics", "out_common_errors")
+    write_scores(
+        predictions=made["out"].predictions,
+        labels=files["test"].labels,
+        truth=scored.truth,
+        train_labels=files["train"].labels,
+        depth=scored.depth,
+        camera=CAMERA,
+        common=made["common"].out,
+        common_truth=made["common"].truth,
+        wildcards=WILDCARDS,
+        **{name: getattr(scored, name) for name in names},
+    )
+    for name in names:
+        assert getattr(made["scoring"], name).read_bytes() == getattr(scored, name).read_bytes()
+
+
+def test_predictions_are_those_of_the_checkpoint(files, made, tmp_path):
     train_and_score(**files, **made)
     again = tmp_path / "again.csv"
-    for name, every in {"predictions": 1, "common": 2}.items():
-        predict_poses(
-            made["out_model"], files["test_frames"], files["test_labels"], again, "cpu", every
-        )
-        assert again.read_bytes() == made[f"out_{name}"].read_bytes()
+    for path, every in {made["out"].predictions: 1, made["common"].out: 2}.items():
+        predict_poses(made["out"].model, *files["test"], again, "cpu", every)
+        assert again.read_bytes() == path.read_bytes()
 
 
-def test_without_a_place_for_scores_there_are_predictions_alone(files, tmp_path):
-    (tmp_path / "run").mkdir()
-    made = outputs(tmp_path / "run")
-    scores = {name: made.pop(name) for name in ("out_errors", "out_metrics", "out_common_errors")}
+def test_without_scoring_there_are_predictions_alone(files, made):
+    scoring = made.pop("scoring")
     train_and_score(**files, **made)
-    assert made["out_predictions"].exists()
-    assert not any(path.exists() for path in scores.values())
+    assert made["out"].predictions.exists()
+    assert not scoring.out_errors.exists()
+    assert not scoring.out_metrics.exists()
 
 
-def test_what_cannot_be_scored_is_not_trained(files, tmp_path):
-    np.save(files["depth"], np.full((N_TEST - 1, 48), 2000, np.uint16))
-    made = outputs(tmp_path)
+def test_what_cannot_be_scored_is_not_trained(files, made, tmp_path):
+    np.save(tmp_path / "depth.npy", np.full((N_TEST - 1, 48), 2000, np.uint16))
     with pytest.raises(InputError, match=r"depth\.npy"):
         train_and_score(**files, **made)
-    assert not made["out_model"].exists()
+    assert not made["out"].model.exists()

@@ -20,6 +20,7 @@ from reproduction.design.experiments import (
 )
 from reproduction.design.files import SPLITS, Files
 from reproduction.design.jobs import jobs_of_run
+from reproduction.design.label_sets import INJECTED_PATTERN
 from reproduction.design.labels import check_sources, estimation_parameters
 from reproduction.design.runs import training_parameters
 from reproduction.design.side_tables import (

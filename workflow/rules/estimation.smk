@@ -2,7 +2,7 @@
 
 ESTIMATED = f"{ROOT}/labels/{{scene}}/{{size}}/{{reconstructed}}"
 TRUE = f"{ROOT}/labels/{{scene}}/{{size}}/synfeal"
-ERRONEOUS = "{scene}/{size}/{error_kind}-p{noise_m}-r{noise_deg}/{split}"
+ERRONEOUS = f"{{scene}}/{{size}}/{INJECTED_PATTERN}/{{split}}"
 STEM = f"{ROOT}/estimates/{{scene}}/{{size}}"
 BATCH = "{split}/batch-{batch}"
 BATCH_LOG = "{scene}/{size}/{split}/batch-{batch}"
