@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from synfeal.mesh.model import Findings, MeshPart, TexturedMesh
 LEVELS = 1.0  # grey levels that rounding may make
 # A face is without area if its height is rounding: of its longest edge, or of its coordinates.
 RELATIVE_HEIGHT = 1e-12
+MOST_REPEATED, FEW_REPEATED = 0.03, 10  # of a part's faces, and faces, that repeat others
 ROUNDING = 4 * np.finfo(np.float64).eps
 
 
@@ -103,12 +105,52 @@ def _show(box: NDArray[np.float64]) -> str:
 
 EXTRA = "synfeal[meshes]"
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply")
+NAMES = ", ".join(SUFFIXES)
+BY_BLENDER = "open it in Blender and export glTF 2.0 (.glb)"
+BY_SURFACE = (
+    "make a surface of it, as MeshLab's Screened Poisson reconstruction does, and save that as PLY"
+)
+BY_SPLATTING = (
+    "export a mesh from the program that made it, or reconstruct one from its photographs"
+)
+SPLAT = "is a Gaussian splat, which has no surface"
+CLOUD = "is a point cloud, which has no surface"
+# What else people have, by suffix: what it is, and what to do.
+OTHER_KINDS = {
+    ".fbx": ("is an FBX scene, which is not read", BY_BLENDER),
+    ".blend": ("is a Blender file, which is not read", BY_BLENDER),
+    ".dae": ("is a COLLADA scene, which is not read", BY_BLENDER),
+    ".3ds": ("is a 3D Studio scene, which is not read", BY_BLENDER),
+    ".x3d": ("is an X3D scene, which is not read", BY_BLENDER),
+    ".wrl": ("is a VRML scene, which is not read", BY_BLENDER),
+    ".abc": ("is an Alembic scene, which is not read", BY_BLENDER),
+    ".ifc": ("is a building model (IFC), which is not read", BY_BLENDER),
+    ".skp": ("is a SketchUp model, which is not read", "export it from SketchUp as glTF or OBJ"),
+    ".max": ("is a 3ds Max scene, which is not read", "export it from 3ds Max as glTF or OBJ"),
+    ".off": ("is an OFF mesh, which is not read", "save it with MeshLab as PLY"),
+    ".usdz": (
+        "is a USDZ scene, as Object Capture, Polycam and RoomPlan write it, which is not read",
+        "export glTF or OBJ from the app, or " + BY_BLENDER,
+    ),
+    **dict.fromkeys((".usd", ".usda", ".usdc"), ("is a USD scene, which is not read", BY_BLENDER)),
+    **dict.fromkeys((".splat", ".spz", ".ksplat", ".sog", ".rad"), (SPLAT, BY_SPLATTING)),
+    **dict.fromkeys((".las", ".laz", ".e57", ".pcd", ".pts", ".ptx", ".xyz"), (CLOUD, BY_SURFACE)),
+    **dict.fromkeys(
+        (".zip", ".7z", ".rar", ".gz", ".tar"),
+        ("is an archive", "unpack it, and give the mesh inside"),
+    ),
+    **dict.fromkeys(
+        (".mtl", ".bin"),
+        ("is a companion of a mesh, not the mesh", "give the .obj or .gltf beside it"),
+    ),
+}
 
 # Required extensions that change nothing here, or that are read.
 READ = {
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
 }
@@ -140,10 +182,10 @@ def refuse_file(path: Path) -> None:
             " the scene as GLB, as OBJ with MTL and textures, or as PLY with vertex colours"
         )
     if suffix not in SUFFIXES:
-        raise InputError(
-            f"{path}: unknown kind of mesh '{path.suffix}'; convert it to one of"
-            f" {', '.join(SUFFIXES)}"
+        kind, remedy = OTHER_KINDS.get(
+            suffix, (f"unknown kind of mesh '{path.suffix}'", f"convert it to one of {NAMES}")
         )
+        raise InputError(f"{path}: {kind}; {remedy}")
 
 
 def refuse_extensions(path: Path, header: Json) -> None:
@@ -180,10 +222,17 @@ def repaired(part: MeshPart, findings: Findings) -> MeshPart:
     _count(findings, part, int((~keep).sum()), "zero-area", "removed")
     faces = part.faces[keep]
     first = _first_of_each(faces)
-    _count(findings, part, len(faces) - len(first), "duplicate", "removed")
+    n_repeated = len(faces) - len(first)
+    if n_repeated > max(FEW_REPEATED, MOST_REPEATED * len(faces)):
+        findings.warn(
+            f"part '{part.name}': {n_repeated} of {len(faces)} faces repeat others and are removed;"
+            " if that leaves holes, export it again from the program that shows it whole"
+        )
+    else:
+        _count(findings, part, n_repeated, "duplicate", "removed")
     faces = faces[first]
-    _, place = np.unique(part.vertices_m, axis=0, return_inverse=True)
-    doubled = len(faces) - len(_first_of_each(place.reshape(-1)[faces]))
+    _, place = distinct_rows(part.vertices_m)
+    doubled = len(faces) - len(_first_of_each(place[faces]))
     _count(findings, part, doubled, "coincident", "kept: their vertices or texture differ")
     part = replace(part, faces=faces)
     if part.uv is not None and not np.isfinite(part.uv).all():
@@ -220,5 +269,21 @@ def _without_area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> ND
 
 def _first_of_each(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the indices, in order, of faces whose three vertices no earlier face has."""
-    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    first, _ = distinct_rows(np.sort(faces, axis=1))
     return np.sort(first)
+
+
+def distinct_rows(rows: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Find equal rows, ten times as fast as ``np.unique`` along an axis.
+
+    Returns:
+        The first index (D,) of each distinct row (N, C), those in ascending order, and which of
+        them (N,) each row is.
+    """
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    is_new = np.ones(len(rows), np.bool_)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    place = np.empty(len(rows), np.int64)
+    place[order] = np.cumsum(is_new) - 1
+    return order[is_new], place

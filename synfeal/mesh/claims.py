@@ -56,31 +56,6 @@ def check_accessors(path: Path, header: Json) -> None:
         )
 
 
-def check_ply(path: Path) -> None:
-    """Check that a PLY of text has as many rows as its header says.
-
-    Those of a binary one are counted by the parser.
-
-    Raises:
-        InputError: It is cut short.
-    """
-    claimed, is_text = 0, False
-    with path.open("rb") as file:
-        for line in file:
-            words = line.split()
-            if words[:1] == [b"end_header"]:
-                break
-            is_text |= words[:2] == [b"format", b"ascii"]
-            if words[:1] == [b"element"] and len(words) == 3 and words[2].isdigit():
-                claimed += int(words[2])
-        held = sum(not line.isspace() for line in file) if is_text else claimed
-    if held < claimed:
-        raise InputError(
-            f"{path}: ends after {held} of {claimed} rows of vertices and faces; download or export"
-            " it again"
-        )
-
-
 def check_extent(path: Path, part: MeshPart) -> None:
     """Check that no vertex of a part is so far away that nothing else could be told apart.
 

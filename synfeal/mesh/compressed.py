@@ -1,4 +1,4 @@
-"""Decoding of compressed and quantised glTF by the library of each kind.
+"""Decoding of compressed and quantised glTF by the library of each kind; strips as triangles.
 
 ``pip install synfeal[meshes]`` installs the libraries: meshoptimizer (EXT_meshopt_compression),
 DracoPy (KHR_draco_mesh_compression) and opengl_basisu (KHR_texture_basisu: KTX2). Quantised
@@ -27,6 +27,9 @@ from synfeal.mesh.gltf import (
     DECODED_URI,
     DRACO,
     MESHOPT,
+    TRIANGLE_FAN,
+    TRIANGLE_STRIP,
+    TRIANGLES,
     Gltf,
     Json,
     listed,
@@ -89,6 +92,7 @@ class _Decoder:
                 for key in ("extensionsRequired", "extensionsUsed"):  # it is no longer needed
                     header[key] = [other for other in header.get(key, []) if other != name]
         self._dequantise()
+        self._list_triangles()
         if self.store:
             buffer = {"uri": DECODED_URI, "byteLength": len(self.store)}
             header.setdefault("buffers", []).append(buffer)
@@ -132,6 +136,26 @@ class _Decoder:
                 is_held = "bufferView" in accessor and "sparse" not in accessor  # else refused
                 if is_read and is_held and accessor["componentType"] != FLOAT32:
                     self._fill(index, fractions(self._values(accessor), accessor))
+
+    def _list_triangles(self) -> None:
+        """Convert strips and fans to lists of triangles, which is how they are read."""
+        for primitive in primitives_of(self.header):
+            mode = primitive.get("mode", TRIANGLES)
+            if mode not in (TRIANGLE_STRIP, TRIANGLE_FAN):
+                continue
+            if "indices" in primitive:
+                accessor = self.header["accessors"][primitive["indices"]]
+                if "bufferView" not in accessor or "sparse" in accessor:
+                    continue  # refused
+                corners = self._values(accessor)[:, 0].astype("<u4")
+            else:
+                positions = self.header["accessors"][primitive["attributes"]["POSITION"]]
+                check_stored(positions)
+                corners = np.arange(positions["count"], dtype="<u4")
+            index = triangles_of(corners, mode).reshape(-1, 1)
+            self.header["accessors"].append({"type": "SCALAR"})
+            self._fill(len(self.header["accessors"]) - 1, index)
+            primitive.update(indices=len(self.header["accessors"]) - 1, mode=TRIANGLES)
 
     def _decode_basisu(self) -> None:
         textures = [t for t in listed(self.header, "textures") if BASISU in t.get("extensions", {})]
@@ -196,6 +220,28 @@ class _Decoder:
         if uri.startswith("data:"):
             return base64.b64decode(uri.partition(",")[2])
         return self._read(uri)
+
+
+def check_stored(accessor: Json) -> None:
+    """Check that the values of an accessor are stored: their number is taken at its word.
+
+    Raises:
+        ValueError: They are not.
+    """
+    if "bufferView" not in accessor:
+        raise ValueError("a strip of triangles has no positions")
+
+
+def triangles_of(corners: NDArray[np.uint32], mode: int) -> NDArray[np.uint32]:
+    """Return the triangles (T, 3) of a strip or a fan, all turned the same way round."""
+    count = max(len(corners) - 2, 0)
+    first = np.arange(count)
+    if mode == TRIANGLE_FAN:
+        found = np.stack([first + 1, first + 2, np.zeros_like(first)], axis=1)
+    else:
+        odd = first % 2
+        found = np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)
+    return np.asarray(corners[found], "<u4").reshape(-1, 3)
 
 
 def decode_meshopt(data: bytes, stored: Json) -> bytes:

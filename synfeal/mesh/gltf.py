@@ -22,6 +22,11 @@ GLB_MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = b"JSON", b"BIN\0"
 BIN_URI = "synfeal-glb-binary-chunk"  # the name under which a resolver is asked for the BIN chunk
 DECODED_URI = "synfeal-decoded"  # the same for what was decompressed
+# Numbers of its specification: how textures go on beyond 0 and 1, and what vertices make up.
+CLAMP_TO_EDGE, MIRRORED_REPEAT, REPEAT = 33071, 33648, 10497
+NEAREST = 9728
+TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN = 4, 5, 6
+NODE_VISIBILITY = "KHR_node_visibility"
 SPECULAR_GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 
 Json = dict[str, Any]
@@ -126,6 +131,8 @@ def simplified(gltf: Gltf) -> Json:
     if gltf.binary and header.get("buffers"):
         header["buffers"][0].setdefault("uri", BIN_URI)
     nodes = header.get("nodes", [])
+    for index in hidden_nodes(header):
+        nodes[index].pop("mesh", None)
     for index, node in enumerate(nodes):
         node["name"] = f"{index:09d}"
     if not header.get("scenes"):  # then all nodes are meant
@@ -144,17 +151,78 @@ def simplified(gltf: Gltf) -> Json:
     return header
 
 
+def hidden_nodes(header: Json) -> set[int]:
+    """Return the nodes that KHR_node_visibility hides, with all below them."""
+    nodes = listed(header, "nodes")
+    pending = [
+        index
+        for index, node in enumerate(nodes)
+        if node.get("extensions", {}).get(NODE_VISIBILITY, {}).get("visible", True) is False
+    ]
+    hidden: set[int] = set()
+    while pending:
+        index = pending.pop()
+        if index not in hidden:
+            hidden.add(index)
+            pending += nodes[index].get("children", [])
+    return hidden
+
+
+def drawn_meshes(header: Json) -> list[int]:
+    """Return the index of the mesh of each node of the scene that is drawn; repeats are instances.
+
+    The scene is the default one, else the first, else all nodes.
+    """
+    nodes, scenes = listed(header, "nodes"), listed(header, "scenes")
+    children = {child for node in nodes for child in node.get("children", [])}
+    roots = [index for index in range(len(nodes)) if index not in children]
+    if scenes:
+        roots = scenes[header.get("scene", 0)].get("nodes", [])
+    hidden, seen, found, pending = hidden_nodes(header), set(), [], list(roots)
+    while pending:
+        index = pending.pop()
+        if index in seen:
+            continue
+        seen.add(index)
+        pending += nodes[index].get("children", [])
+        if "mesh" in nodes[index] and index not in hidden:
+            found.append(nodes[index]["mesh"])
+    return found
+
+
+def sampler_of(header: Json, material: Json) -> Json:
+    """Return the sampler of a material's base colour; empty if it has none."""
+    slot = base_color(material).get("baseColorTexture")
+    if slot is None:
+        return {}
+    texture = header["textures"][slot["index"]]
+    return header["samplers"][texture["sampler"]] if "sampler" in texture else {}
+
+
 def base_color(material: Json) -> Json:
     """Reduce ``pbrMetallicRoughness`` to colour: texture and factor, if any.
 
     Of the older specular-glossiness materials it is the diffuse colour.
     """
     source = material.get("pbrMetallicRoughness", {})
+    if is_lit_by_itself(material):
+        emitted = {"baseColorTexture": material["emissiveTexture"]}
+        alpha = source.get("baseColorFactor", [1.0] * 4)[3]
+        factor = [*material.get("emissiveFactor", [1.0] * 3), alpha]
+        return {**emitted, "baseColorFactor": factor}
     glossy = material.get("extensions", {}).get(SPECULAR_GLOSSINESS)
     if glossy is not None:
         renamed = {"diffuseTexture": "baseColorTexture", "diffuseFactor": "baseColorFactor"}
         source = {renamed.get(key, key): value for key, value in glossy.items()}
     return {key: source[key] for key in ("baseColorTexture", "baseColorFactor") if key in source}
+
+
+def is_lit_by_itself(material: Json) -> bool:
+    """Check whether a material is black but for a texture that it emits: a baked scene."""
+    color = material.get("pbrMetallicRoughness", {})
+    is_black = not any(color.get("baseColorFactor", [1.0] * 4)[:3])
+    emits = "emissiveTexture" in material and any(material.get("emissiveFactor", [0.0] * 3))
+    return is_black and emits and SPECULAR_GLOSSINESS not in material.get("extensions", {})
 
 
 def _use_one_uv_set(attributes: Json, material: Json) -> None:
@@ -186,10 +254,12 @@ DRACO, BASISU = "KHR_draco_mesh_compression", "KHR_texture_basisu"
 WEBP, TEXTURE_TRANSFORM = "EXT_texture_webp", "KHR_texture_transform"
 # Extensions that are read, and keys of theirs and of glTF's by what stands there.
 EXTENSIONS = {*MESHOPT, DRACO, BASISU, WEBP, TEXTURE_TRANSFORM, SPECULAR_GLOSSINESS}
+EXTENSIONS |= {NODE_VISIBILITY}
 MAPPINGS = {
     "attributes",
     "baseColorTexture",
     "diffuseTexture",
+    "emissiveTexture",
     "extensions",
     "pbrMetallicRoughness",
     "sparse",

@@ -8,9 +8,10 @@ and its depth is that surface's.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,9 @@ from trimesh.visual.color import linear_to_srgb, srgb_to_linear, to_float
 
 from synfeal.errors import why
 from synfeal.mesh.claims import check_textures
-from synfeal.mesh.gltf import Json, base_color
-from synfeal.mesh.model import WHITE, Findings
+from synfeal.mesh.gltf import REPEAT, Json, base_color, sampler_of
+from synfeal.mesh.model import Findings
+from synfeal.mesh.references import ReferenceResolver
 
 Pixels = NDArray[np.uint8]
 
@@ -36,15 +38,35 @@ MAX_PIXELS = 2**28  # a square of that side, 1 GB when decoded: what is larger i
 
 @dataclass(frozen=True)
 class BaseMaterial:
-    """Texture (H, W, 3 | 4) or None, base colour (4,) uint8 sRGB, alpha cutoff or None.
+    """What an unlit image shows of a glTF material.
 
-    ``uv_transform`` (3, 3) applies to texture coordinates with the origin at the top left.
+    Attributes:
+        texture: Pixels (H, W, 3 | 4), or None.
+        base_color: Colour (4,) uint8, sRGB.
+        alpha_cutoff: Of texture and base colour; None where they are opaque.
+        uv_transform: Matrix (3, 3) for texture coordinates with the origin at the top left.
+        vertex_cutoff: Opacity below which vertices are not seen; None where theirs does not count.
+        wrap: How the texture goes on beyond 0 and 1, along u and v, by glTF's numbers.
+        owner: What findings call it.
     """
 
     texture: Pixels | None
     base_color: Pixels
     alpha_cutoff: float | None = None
     uv_transform: NDArray[np.float64] | None = None
+    vertex_cutoff: float | None = None
+    wrap: tuple[int, int] = (REPEAT, REPEAT)
+    owner: str = "material"
+    _doubled: dict[tuple[bool, bool], Pixels] = field(default_factory=dict, repr=False)
+
+    def doubled(self, along_u: bool, along_v: bool, findings: Findings) -> Pixels:
+        """Return the texture with its mirror image beside or above it, or both; once for all."""
+        key = (along_u, along_v)
+        if key not in self._doubled:
+            assert self.texture is not None
+            texture = mirrored(self.texture, along_u, along_v)
+            self._doubled[key] = within_limit(texture, self.owner, findings)
+        return self._doubled[key]
 
     def transformed(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
         """Apply the material's transform to texture coordinates (V, 2), origin bottom left."""
@@ -55,41 +77,100 @@ class BaseMaterial:
         return np.column_stack([u, 1.0 - v])
 
 
-class MaterialReader:
-    """Reduces the materials of one file, each once, however many parts share it."""
+class _Decoder:
+    """Decodes the textures of one file, if they fit into memory together."""
 
-    def __init__(self, header: Json | None, findings: Findings, path: Path) -> None:
-        """Take the JSON of a glTF, whose colours and factors are linear, or None."""
-        self._header = header
-        self._findings = findings
+    def __init__(self, path: Path, findings: Findings) -> None:
         self._path = path
+        self._findings = findings
         self._n_pixels = 0
+
+    def _decoded(self, image: Image.Image | None, owner: str) -> Pixels | None:
+        if image is not None and image.width * image.height <= MAX_PIXELS:
+            self._n_pixels += image.width * image.height
+            check_textures(self._path, self._n_pixels)
+        return decode(image, owner, self._findings)
+
+
+class TextureReader(_Decoder):
+    """Reads the texture files that an OBJ or PLY names, each once."""
+
+    def __init__(self, path: Path, resolver: ReferenceResolver, findings: Findings) -> None:
+        """Take the mesh's file, and what finds the files it names."""
+        super().__init__(path, findings)
+        self._resolver = resolver
+        self._known: dict[str, Pixels | None] = {}
+
+    def read(self, name: str, owner: str) -> Pixels | None:
+        """Return pixels (H, W, 3 | 4); None if the file is missing or no image, which is told.
+
+        Args:
+            name: File, as the mesh has it.
+            owner: What findings call its owner, such as ``material 'Wall'``.
+        """
+        if name not in self._known:
+            self._known[name] = self._read(name, owner)
+        return self._known[name]
+
+    def _read(self, name: str, owner: str) -> Pixels | None:
+        try:
+            content = self._resolver.get(name)
+        except FileNotFoundError:  # remembered by the resolver
+            return None
+        try:
+            image = Image.open(io.BytesIO(content))
+        except (OSError, SyntaxError, ValueError):
+            self._resolver.unreadable.append(name)
+            return None
+        return self._decoded(image, owner)
+
+
+class MaterialReader(_Decoder):
+    """Reduces the materials of one glTF, each once, however many parts share it."""
+
+    def __init__(self, header: Json, findings: Findings, path: Path) -> None:
+        """Take the JSON of the glTF, whose colours and factors are linear."""
+        super().__init__(path, findings)
+        self._header = header
         self._known: dict[int, BaseMaterial] = {}
+        self._textureless: set[str] = set()
 
     def read(self, material: Any) -> BaseMaterial:
         """Reduce a trimesh material to its base colour, once per material."""
         if id(material) not in self._known:
-            reduced = self._from_mtl if self._header is None else self._from_gltf
-            self._known[id(material)] = reduced(material)
+            self._known[id(material)] = self._from_gltf(material)
         return self._known[id(material)]
+
+    def report_lost_textures(self) -> None:
+        """Name materials whose texture did not arrive and is named nowhere else."""
+        said = " ".join(self._findings.sentences)
+        for owner in sorted(self._textureless):
+            if owner.removeprefix("material ") not in said:
+                self._findings.warn(f"{owner}: its texture cannot be read; its base colour is used")
+
+    def vertex_opacity(self, geometry: trimesh.Trimesh) -> NDArray[np.float64] | None:
+        """Return the opacity (V,) of a trimesh geometry's vertices; None if all are opaque."""
+        if SRGB_ATTRIBUTE in geometry.vertex_attributes:  # of our own, always opaque
+            return None
+        stored = _stored_colors(geometry)
+        if stored is None or np.shape(stored)[1] < 4:
+            return None
+        opacity = np.clip(np.nan_to_num(to_float(stored)[:, 3], nan=1.0), 0.0, 1.0)
+        return None if (opacity == 1.0).all() else np.asarray(opacity, np.float64)
 
     def vertex_rgb(self, geometry: trimesh.Trimesh) -> Pixels | None:
         """Return the sRGB colours (V, 3) of a trimesh geometry's vertices; None if it has none."""
         exact = geometry.vertex_attributes.get(SRGB_ATTRIBUTE)
         if exact is not None:
             return np.asarray(exact, dtype=np.uint8)[:, :3]
-        visual = geometry.visual
-        extra = getattr(visual, "vertex_attributes", {})
-        stored: Any = visual.vertex_colors if visual.kind == "vertex" else extra.get("color")
+        stored = _stored_colors(geometry)
         if stored is None:
             return None
-        colors = np.clip(np.nan_to_num(to_float(stored)), 0.0, 1.0)[:, :3]
-        is_linear = self._header is not None
-        return srgb_from_linear(colors) if is_linear else np.round(255 * colors).astype(np.uint8)
+        return srgb_from_linear(np.clip(np.nan_to_num(to_float(stored)), 0.0, 1.0)[:, :3])
 
     def _from_gltf(self, material: Any) -> BaseMaterial:
         index = int(material.name)  # given by synfeal.mesh.gltf.simplified
-        described = dict(enumerate((self._header or {}).get("materials", []))).get(index, {})
+        described = dict(enumerate(self._header.get("materials", []))).get(index, {})
         owner = f"material '{described.get('name', 'unnamed')}'"
         color = base_color(described)
         texture = self._decoded(material.baseColorTexture, owner)
@@ -98,56 +179,45 @@ class MaterialReader:
         cutoff = BLEND_CUTOFF if mode == "BLEND" else None
         if mode == "MASK":
             cutoff = float(described.get("alphaCutoff", GLTF_DEFAULT_CUTOFF))
-        if cutoff is not None and texture is None and "baseColorTexture" in color:
-            self._findings.warn(f"{owner}: its transparency was in its texture; drawn opaque")
+        if texture is None and "baseColorTexture" in color:
+            self._textureless.add(owner)
+            if cutoff is not None:
+                self._findings.warn(f"{owner}: its transparency was in its texture; drawn opaque")
+        vertex_cutoff = cutoff
         if is_opaque(texture, base):
             cutoff = None
         elif cutoff is not None:
             self._note_cutoff(owner, mode == "BLEND", cutoff)
         transform = uv_transform(color.get("baseColorTexture", {}))
-        return BaseMaterial(texture, base, cutoff, transform)
-
-    def _from_mtl(self, material: Any) -> BaseMaterial:
-        """Convert an MTL or PLY material; alpha counts where ``map_d`` or ``d`` say so."""
-        owner = f"material '{material.name or 'unnamed'}'"
-        texture = self._decoded(material.image, owner)
-        # MTL writes Kd next to map_Kd without meaning the product; many exporters leave Kd at 0.
-        base = np.array(material.diffuse, np.uint8) if material.image is None else WHITE.copy()
-        extra = {key.lower(): value for key, value in material.kwargs.items()}
-        base[3] = round(255 * _mtl_opacity(extra))
-        has_alpha = base[3] < 255 or "map_d" in extra
-        if not has_alpha or is_opaque(texture, base):
-            return BaseMaterial(None if texture is None else texture[..., :3], base)
-        self._note_cutoff(owner, True, BLEND_CUTOFF)
-        return BaseMaterial(texture, base, BLEND_CUTOFF)
-
-    def _decoded(self, image: Image.Image | None, owner: str) -> Pixels | None:
-        """Decode the texture, if it fits into memory beside those before it."""
-        if image is not None and image.width * image.height <= MAX_PIXELS:
-            self._n_pixels += image.width * image.height
-            check_textures(self._path, self._n_pixels)
-        return decode(image, owner, self._findings)
+        sampler = sampler_of(self._header, described)
+        wrap = (int(sampler.get("wrapS", REPEAT)), int(sampler.get("wrapT", REPEAT)))
+        return BaseMaterial(texture, base, cutoff, transform, vertex_cutoff, wrap, owner)
 
     def _note_cutoff(self, owner: str, is_blended: bool, cutoff: float) -> None:
         kind = "blended transparency becomes an alpha test" if is_blended else "alpha-tested"
         self._findings.note(f"{owner}: {kind} at {cutoff:.2g}")
 
 
+def _stored_colors(geometry: trimesh.Trimesh) -> Any:
+    """Return the colours (V, 3 | 4) of a geometry as the file has them, None if it has none."""
+    visual = geometry.visual
+    extra = getattr(visual, "vertex_attributes", {})
+    return visual.vertex_colors if visual.kind == "vertex" else extra.get("color")
+
+
+def mirrored(texture: Pixels, along_u: bool, along_v: bool) -> Pixels:
+    """Return a texture (H, W, C) with its mirror image beside or above it, or both."""
+    if along_u:
+        texture = np.concatenate([texture, texture[:, ::-1]], axis=1)
+    if along_v:  # v goes up, rows go down
+        texture = np.concatenate([texture[::-1], texture], axis=0)
+    return texture
+
+
 def is_opaque(texture: Pixels | None, base: Pixels) -> bool:
     """Check whether texture and base colour are fully opaque."""
     texture_opaque = texture is None or texture.shape[2] == 3 or texture[..., 3].min() == 255
     return bool(texture_opaque and base[3] == 255)
-
-
-def _mtl_opacity(extra: dict[str, Any]) -> float:
-    """Return the opacity of an MTL: ``d``, or one minus ``Tr``; 1 where neither is a number."""
-    for key, sign in (("d", 1.0), ("tr", -1.0)):
-        try:
-            value = float(extra[key][-1])
-        except (KeyError, IndexError, ValueError):
-            continue
-        return float(np.clip(value if sign > 0 else 1.0 - value, 0.0, 1.0))
-    return 1.0
 
 
 def uv_transform(slot: Json) -> NDArray[np.float64] | None:

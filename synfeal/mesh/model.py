@@ -27,6 +27,8 @@ class MeshPart:
     base_color: NDArray[np.uint8] = field(default_factory=WHITE.copy)
     # fragments with less alpha than this are not drawn; None draws all of them
     alpha_cutoff: float | None = None
+    # along u and v: texture coordinates beyond 0 and 1 show the texture's edge, else it repeats
+    clamped_uv: tuple[bool, bool] = (False, False)
 
     @property
     def is_drawn(self) -> bool:

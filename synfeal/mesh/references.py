@@ -45,6 +45,18 @@ class ReferenceResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
             FileNotFoundError: It is nowhere it could be meant to be.
             InputError: It is there, outside of the mesh's folder.
         """
+        content = self.find(name)
+        if content is None:
+            self.missing.append(name)
+            raise FileNotFoundError(f"'{name}' is missing")
+        return content
+
+    def find(self, name: str) -> bytes | None:
+        """Read a file the mesh refers to; None if it is nowhere it could be meant to be.
+
+        Raises:
+            InputError: It is there, outside of the mesh's folder.
+        """
         if name in self._held:
             return self._held[name]
         found = [p for p in (Path(self.parent) / s for s in _spellings(name)) if p.is_file()]
@@ -57,8 +69,23 @@ class ReferenceResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
                 " read; put a copy beside the mesh and name that"
             )
             raise self._refusal
-        self.missing.append(name)
-        raise FileNotFoundError(f"'{name}' is missing")
+        other = self._in_other_case(name)
+        return None if other is None else self._checked(name, other.read_bytes())
+
+    def _in_other_case(self, name: str) -> Path | None:
+        """Find a file whose name differs in upper and lower case, as Windows does not mind."""
+        for spelling in _spellings(name):
+            path = Path(self.parent) / spelling
+            wanted = path.name.lower()
+            try:
+                beside = sorted(path.parent.iterdir())
+            except OSError:
+                continue
+            for other in beside:
+                is_meant = other.name.lower() == wanted and other.is_file()
+                if is_meant and any(lies_in(other, folder) for folder in self._folders):
+                    return other
+        return None
 
     def raise_refusal(self) -> None:
         """Raise the first refusal, if there was one."""
@@ -78,10 +105,9 @@ class ReferenceResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
 def _spellings(name: str) -> dict[str, None]:
     """List paths a reference can mean: as written, percent-encoded, from Windows, without folder.
 
-    Exporters write the absolute path of the artist's disk; the file then lies beside the mesh. An
-    MTL may put options before the name.
+    Exporters write the absolute path of the artist's disk; the file then lies beside the mesh.
     """
-    plain = name.split()[-1] if name.lstrip().startswith("-") else name.strip().strip('"')
+    plain = name.strip().strip('"')
     slashes = unquote(plain).replace("\\", "/")
     return dict.fromkeys([name, plain, unquote(plain), slashes, PurePosixPath(slashes).name])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
@@ -15,6 +15,7 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from synfeal.errors import InputError
+from synfeal.mesh.gltf import CLAMP_TO_EDGE, REPEAT
 from synfeal.mesh.load import WORLD_FROM_Y_UP
 from synfeal.mesh.materials import SRGB_ATTRIBUTE, linear_from_srgb
 from synfeal.mesh.model import MeshPart, TexturedMesh
@@ -57,7 +58,7 @@ def save_glb(path: Path, mesh: TexturedMesh) -> None:
             transform=trimesh.transformations.translation_matrix(WORLD_FROM_Y_UP.T @ origin_m),
         )
     with atomic_path(path) as temporary:
-        exported = scene.export(file_type="glb", tree_postprocessor=materials.set_exact_factors)
+        exported = scene.export(file_type="glb", tree_postprocessor=materials.complete)
         temporary.write_bytes(exported)
 
 
@@ -74,15 +75,25 @@ def storage_grid(bounds_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], fl
     return np.round(bounds_m.mean(axis=0) / step_m) * step_m, step_m
 
 
+class _Look(NamedTuple):
+    """What parts that look alike have in common."""
+
+    texture: int
+    base_color: bytes
+    alpha_cutoff: float | None
+    clamped_uv: tuple[bool, bool]
+
+
 class _Materials:
     """The glTF materials of a mesh: one for all parts that look alike, with exact base colours."""
 
     def __init__(self) -> None:
-        self._made: dict[tuple[int, bytes, float | None], PBRMaterial] = {}
+        self._made: dict[_Look, PBRMaterial] = {}
 
     def of(self, part: MeshPart) -> PBRMaterial:
         """Return the material of a part."""
-        key = (id(part.texture), part.base_color.tobytes(), part.alpha_cutoff)
+        base_color = part.base_color.tobytes()
+        key = _Look(id(part.texture), base_color, part.alpha_cutoff, part.clamped_uv)
         if key not in self._made:
             self._made[key] = PBRMaterial(
                 name=f"{len(self._made)}:{part.name}",
@@ -95,14 +106,27 @@ class _Materials:
             )
         return self._made[key]
 
-    def set_exact_factors(self, tree: dict[str, Any]) -> None:
-        """Replace the base colours of an exported glTF, which trimesh keeps in 8 linear bits."""
-        colors = [np.frombuffer(base, np.uint8) for _, base, _ in self._made]
+    def complete(self, tree: dict[str, Any]) -> None:
+        """Give the materials of an exported glTF what trimesh does not write.
+
+        That is base colours, which it keeps in 8 linear bits, and samplers.
+        """
+        looks = list(self._made)
         for material in tree.get("materials", []):
             index, _, name = material["name"].partition(":")
-            factor = linear_from_srgb(colors[int(index)]).tolist()
-            material.setdefault("pbrMetallicRoughness", {})["baseColorFactor"] = factor
+            look = looks[int(index)]
+            color = material.setdefault("pbrMetallicRoughness", {})
+            base_color = np.frombuffer(look.base_color, np.uint8)
+            color["baseColorFactor"] = linear_from_srgb(base_color).tolist()
             material["name"] = name
+            if any(look.clamped_uv) and "baseColorTexture" in color:
+                slot = color["baseColorTexture"]
+                modes = [CLAMP_TO_EDGE if is_clamped else REPEAT for is_clamped in look.clamped_uv]
+                samplers = tree.setdefault("samplers", [])
+                texture = dict(tree["textures"][slot["index"]], sampler=len(samplers))
+                samplers.append(dict(zip(("wrapS", "wrapT"), modes, strict=True)))
+                color["baseColorTexture"] = {**slot, "index": len(tree["textures"])}
+                tree["textures"].append(texture)
 
 
 def _geometry(

@@ -124,7 +124,10 @@ class DevicePart:
         self._index = context.buffer(self._chunks.faces.astype(np.uint32))
         is_textured = part.texture is not None and part.uv is not None
         pixels = thresholded(part) if is_textured else None
-        self._texture = None if pixels is None else _upload(context, pixels)
+        self._texture = None
+        if pixels is not None:
+            self._texture = _upload(context, pixels)
+            self._texture.repeat_x, self._texture.repeat_y = (not c for c in part.clamped_uv)
         position = self._attribute(vertices_m[used].astype(np.float32), "3f", "position")
         uv, rgb = [], []
         if part.uv is not None and is_textured:

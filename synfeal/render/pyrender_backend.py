@@ -54,6 +54,7 @@ os.environ["PYOPENGL_PLATFORM"] = "egl"
 try:
     import pyrender
     from OpenGL import GL
+    from pyrender.constants import GLTF
     from pyrender.platforms import egl
     from pyrender.shader_program import ShaderProgramCache
 except AttributeError as error:  # of PyOpenGL, where a library lacks functions that it looks up
@@ -184,7 +185,8 @@ def _primitive(part: MeshPart, centre_m: NDArray[np.float64]) -> Any:
         pixels = thresholded(part)
         channels = "RGBA" if pixels.shape[2] == 4 else "RGB"
         # Trilinear filtering costs a fifth more and is no closer to the mean of many samples.
-        sampler = pyrender.Sampler(minFilter=pyrender.constants.GLTF.LINEAR_MIPMAP_NEAREST)
+        wrap_s, wrap_t = (GLTF.CLAMP_TO_EDGE if c else GLTF.REPEAT for c in part.clamped_uv)
+        sampler = pyrender.Sampler(minFilter=GLTF.LINEAR_MIPMAP_NEAREST, wrapS=wrap_s, wrapT=wrap_t)
         texture = pyrender.Texture(sampler=sampler, source=pixels, source_channels=channels)
     material = pyrender.MetallicRoughnessMaterial(
         baseColorTexture=texture,

@@ -64,9 +64,9 @@ class TexturedTriangles:
         # Index in the mesh of each triangle, and of nothing, the last.
         self.face_of_mesh = np.append(np.flatnonzero(drawn), -1).astype(np.int32)
         self._tint = np.array([part.base_color[:3] / 255.0 for part in parts])
-        textures, self._texture_of = _textures(parts)
+        textures, clamped_uv, self._texture_of = _textures(parts)
         self._has_cutouts = np.array([a.shape[2] == 4 for a in textures])[self._texture_of]
-        self._textures = MipMaps(textures)
+        self._textures = MipMaps(textures, clamped_uv)
 
     def first_drawn(self, view: Viewpoint, rays: Floats) -> tuple[Faces, Floats]:
         """Find the first triangle (N,) that shows on each ray, -1 for none, and its depth (N,).
@@ -151,15 +151,24 @@ class TexturedTriangles:
         return face, start_m + distance_m / np.linalg.norm(rays, axis=1)
 
 
-def _textures(parts: list[MeshPart]) -> tuple[list[NDArray[np.uint8]], NDArray[np.intp]]:
-    """Return distinct textures, white for parts without one, and the texture of each part."""
+def _textures(
+    parts: list[MeshPart],
+) -> tuple[list[NDArray[np.uint8]], list[tuple[bool, bool]], NDArray[np.intp]]:
+    """List distinct textures, white for parts without one.
+
+    Returns:
+        The textures, whether each is clamped along u and v, and the texture of each part.
+    """
     keys = [
-        p.texture is not None and (id(p.texture), p.alpha_cutoff, p.base_color[3]) for p in parts
+        part.texture is not None
+        and (id(part.texture), part.alpha_cutoff, part.base_color[3], part.clamped_uv)
+        for part in parts
     ]
     shown = dict(zip(keys, parts, strict=True))
     order, white = list(shown), np.full((1, 1, 3), 255, np.uint8)
     textures = [white if part.texture is None else thresholded(part) for part in shown.values()]
-    return textures, np.array([order.index(key) for key in keys])
+    clamped_uv = [part.clamped_uv for part in shown.values()]
+    return textures, clamped_uv, np.array([order.index(key) for key in keys])
 
 
 def _rows(parts: list[MeshPart], centre_m: Floats) -> Floats:
@@ -199,11 +208,22 @@ def _linear(corners: Floats, values: Floats) -> Floats:
 class MipMaps:
     """Several textures with all their mip levels in one buffer, so that one look-up serves all.
 
-    Looked up as OpenGL does it: repeated, and bilinear in the mip level just sharp enough.
+    Looked up as OpenGL does it: repeated or clamped to the edge, and bilinear in the mip level just
+    sharp enough.
     """
 
-    def __init__(self, textures: Sequence[NDArray[np.uint8]]) -> None:
-        """Halve each texture (H, W, 3 | 4), first row at the top, down to one texel."""
+    def __init__(
+        self,
+        textures: Sequence[NDArray[np.uint8]],
+        clamped_uv: Sequence[tuple[bool, bool]] | None = None,
+    ) -> None:
+        """Halve each texture down to one texel.
+
+        Args:
+            textures: Pixels (H, W, 3 | 4), first row at the top.
+            clamped_uv: Whether each is clamped along u and v; all repeat if None.
+        """
+        self._is_clamped = np.array(clamped_uv or [(False, False)] * len(textures))
         sizes = [_sizes(texture.shape[1], texture.shape[0]) for texture in textures]
         self._top_level = np.array([len(chain) - 1 for chain in sizes])
         # Width and height, and where the level starts, by texture and level.
@@ -235,8 +255,9 @@ class MipMaps:
 
     def _bilinear(self, texture: NDArray[np.intp], level: NDArray[np.intp], uv: Floats) -> Rgba:
         width, height = self._size[texture, level].T
-        left, right, x_share = _neighbours(uv[:, 0], width)
-        upper, lower, y_share = _neighbours(1.0 - uv[:, 1], height)
+        clamp_u, clamp_v = self._is_clamped[texture].T
+        left, right, x_share = _neighbours(uv[:, 0], width, clamp_u)
+        upper, lower, y_share = _neighbours(1.0 - uv[:, 1], height, clamp_v)
         start = self._start[texture, level]
         upper, lower = start + upper * width, start + lower * width
         corners = (row + column for row in (upper, lower) for column in (left, right))
@@ -266,11 +287,22 @@ def _levels(texture: NDArray[np.uint8]) -> Iterator[NDArray[np.uint32]]:
 
 
 def _neighbours(
-    position: Floats, size: NDArray[np.int64]
+    position: Floats, size: NDArray[np.int64], is_clamped: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Rgba]:
-    """Return the texels around a repeated position, and the share (N, 1) of the second."""
+    """Return the texels around a position, and the share (N, 1) of the second."""
     texel = position * size - 0.5
     below = np.floor(texel)
     share = (texel - below).astype(np.float32)[:, None]
-    first = below.astype(np.int64) % size
-    return first, (first + 1) % size, share
+    first = below.astype(np.int64)
+    second = first + 1
+    return _inside(first, size, is_clamped), _inside(second, size, is_clamped), share
+
+
+def _inside(
+    texel: NDArray[np.int64], size: NDArray[np.int64], is_clamped: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Return the texel that shows at a place beyond the texture."""
+    repeated = texel % size
+    if not is_clamped.any():
+        return repeated
+    return np.where(is_clamped, np.clip(texel, 0, size - 1), repeated)

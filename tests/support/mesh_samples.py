@@ -161,3 +161,13 @@ def is_sound_triangles(mesh):
 
 def is_sound(mesh):
     return bool(mesh.parts) and all(map(is_sound_triangles, mesh.parts))
+
+
+def paint_halves(path, left, right, turned=False):
+    """A texture whose left half is of one colour, its right half of another; turned, top to bottom.
+
+    In glTF, the top is where texture coordinates begin.
+    """
+    pixels = np.zeros((16, 16, 3), np.uint8)
+    pixels[:, :8], pixels[:, 8:] = left, right
+    Image.fromarray(pixels.transpose(1, 0, 2) if turned else pixels).save(path)

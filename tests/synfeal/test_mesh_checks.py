@@ -195,3 +195,21 @@ def test_holes_are_measured_along_their_rims_as_by_counting():
     assert topology["boundary_edges"] == len(rim) > 0
     assert sum(topology["hole_lengths_m"]) == pytest.approx(length)
     assert list(topology["hole_lengths_m"]) == sorted(topology["hole_lengths_m"], reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("room.fbx", "is an FBX scene.*Blender"),
+        ("room.usdz", "is a USDZ scene.*export glTF or OBJ from the app"),
+        ("room.splat", "is a Gaussian splat.*has no surface"),
+        ("room.las", "is a point cloud.*make a surface"),
+        ("room.zip", "is an archive; unpack it"),
+        ("room.MTL", "is a companion of a mesh"),
+        ("room.foo", r"unknown kind of mesh '\.foo'; convert it to one of \.glb"),
+    ],
+)
+def test_files_of_other_kinds_are_called_what_they_are(tmp_path, name, said):
+    (tmp_path / name).write_bytes(b"x")
+    with pytest.raises(InputError, match=said):
+        load_mesh(tmp_path / name)

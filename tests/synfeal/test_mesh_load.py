@@ -186,7 +186,7 @@ HEADER_ONLY = b'{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attri
     [
         ("none.glb", None, "no such mesh file"),
         ("empty.obj", b"", "empty"),
-        ("scene.fbx", b"x", "unknown kind"),
+        ("scene.fbx", b"x", "is an FBX scene"),
         ("scan.stl", b"solid\nendsolid\n", "without colour.*as GLB"),
         ("bad.glb", b"not a glb at all, but long enough to be read as a header", "not a GLB"),
         ("old.glb", b"glTF" + struct.pack("<II", 1, 24) + b"\0" * 12, "glTF 1"),

@@ -20,7 +20,7 @@ from tests.support.mesh_samples import (
     write_obj,
 )
 
-COLORS = np.array([[1, 2, 3, 4]] * 3, np.uint8)
+COLORS = np.array([[1, 2, 3, 255]] * 3, np.uint8)
 
 
 def plain(*color):
@@ -116,11 +116,11 @@ def test_obj_alpha_counts_where_the_mtl_says_so(tmp_path, mtl, channels, cutoff)
 def test_glass_is_not_drawn(painted, tmp_path):
     material = textured({"alphaMode": "BLEND"})
     material["pbrMetallicRoughness"]["baseColorFactor"] = [1, 1, 1, 0.03]
-    with pytest.raises(InputError, match="no faces"):
+    with pytest.raises(InputError, match="is transparent everywhere"):
         painted(plain(255, 255), material)
     plain(0, 0, 0).save(tmp_path / "wall.png")
     for opacity in ("d 0.03", "Tr 0.97"):
-        with pytest.raises(InputError, match="no faces"):
+        with pytest.raises(InputError, match="is transparent everywhere"):
             load_mesh(write_obj(tmp_path, f"map_Kd wall.png\n{opacity}\n"))
 
 

@@ -1,0 +1,97 @@
+"""Lines of numbers, millions at once: those of one form go through pandas together."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+
+OF_NUMBERS = b"0123456789+-.eE"
+SHOWN = 60  # characters of a line that a message quotes
+
+
+def lines_by_form(block: bytes) -> Iterator[tuple[Ints, bytes]]:
+    """Group lines that differ in their digits only.
+
+    Args:
+        block: Lines, each with a newline at its end.
+
+    Yields:
+        The positions (N,) of lines of one form, ascending, and the lines.
+    """
+    if not block:
+        return
+    forms = block.translate(None, OF_NUMBERS)
+    count = forms.count(b"\n")
+    first = forms[: forms.find(b"\n") + 1]
+    if forms == first * count:
+        yield np.arange(count), block
+        return
+    lines = block.split(b"\n")[:-1]
+    form_of, distinct = pd.factorize(np.array(forms.split(b"\n")[:-1], object))
+    order = np.argsort(form_of, kind="stable")
+    ends = np.cumsum(np.bincount(form_of, minlength=len(distinct)))
+    for group in np.split(order, ends[:-1]):
+        yield group.astype(np.int64), b"".join(lines[index] + b"\n" for index in group)
+
+
+def table_of(block: bytes, n_columns: int, dtype: type) -> NDArray[Any]:
+    """Read lines of equally many numbers as an array (N, ``n_columns``).
+
+    Raises:
+        ValueError: A line holds something else.
+    """
+    try:
+        found = pd.read_csv(
+            io.BytesIO(block),
+            sep=r"\s+",
+            header=None,
+            names=range(n_columns),
+            index_col=False,
+            dtype=dtype,
+            quoting=csv.QUOTE_NONE,
+            encoding="latin-1",
+            skip_blank_lines=False,
+            low_memory=False,
+        )
+    except (ValueError, OverflowError) as error:
+        raise _blamed(block, n_columns, dtype) from error
+    return found.to_numpy(dtype)
+
+
+def _blamed(block: bytes, n_columns: int, dtype: type) -> ValueError:
+    """Find the line of a block that is not what it should be."""
+    kind = float if dtype is np.float64 else int
+    for line in block.split(b"\n")[:-1]:
+        words = line.split()
+        if len(words) != n_columns:
+            return ValueError(f"'{shown(line)}' should have {n_columns} numbers")
+        for word in words:
+            try:
+                kind(word)
+            except ValueError:
+                hint = "; write decimals with a point" if b"," in word else ""
+                noun = "number" if kind is float else "whole number"
+                return ValueError(f"'{shown(word)}' in '{shown(line)}' is no {noun}{hint}")
+    return ValueError("its numbers are too large")
+
+
+def shown(text: bytes) -> str:
+    """Return text as a message quotes it."""
+    word = decoded(text.strip())
+    return word if len(word) <= SHOWN else f"{word[:SHOWN]} ..."
+
+
+def decoded(text: bytes) -> str:
+    """Decode a name: UTF-8, else what Windows writes in the west."""
+    try:
+        return text.decode("utf-8")
+    except UnicodeDecodeError:
+        return text.decode("cp1252", errors="replace")
