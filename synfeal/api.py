@@ -23,9 +23,9 @@ from synfeal.config.dataset import CameraConfig, DatasetConfig
 from synfeal.config.options import SCENE, dataset_config, options_named, render_configs
 from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.known_camera import camera_of_dataset
 from synfeal.dataset.layer_files import read_instances, read_mask, read_normals
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.posed_sequence import refuse_non_rigid
 from synfeal.dataset.sequence_listing import (
     COLOR,
     DEPTH,
@@ -38,6 +38,7 @@ from synfeal.dataset.split_frames import SplitFrames, read_split_frames
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.limits import FARTHEST_M
 from synfeal.geometry.poses import moved_right
+from synfeal.geometry.rigid import refuse_non_rigid
 from synfeal.mesh import load
 from synfeal.mesh.ambient import with_ambient_light
 from synfeal.mesh.instances import Instance, number_instances
@@ -49,7 +50,6 @@ from synfeal.records.provenance import generator_of
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Rgb
 from synfeal.render.surface import Normals, SurfaceImage, SurfaceTable
-from synfeal.validation.camera import camera_of_dataset
 
 if TYPE_CHECKING:
     import pandas as pd

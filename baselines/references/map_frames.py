@@ -12,9 +12,10 @@ from synfeal.camera.projection import pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.types import Positive, Strict
 from synfeal.dataset.depth import Depth
-from synfeal.dataset.finish import MANIFEST
+from synfeal.dataset.depth_agreement import PosedDepth
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.images import image_size
+from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
 from synfeal.dataset.sevenscenes import read_split
 from synfeal.dataset.world import read_sequence_from_world
@@ -23,7 +24,6 @@ from synfeal.geometry.axes import PosesAre, meant_poses
 from synfeal.mesh.load import UpAxis
 from synfeal.records.files import read_json
 from synfeal.scanning.camera import CameraOptions, RgbdCamera, posed_depth, rgbd_camera
-from synfeal.validation.depth_agreement import PosedDepth
 
 Array = NDArray[np.float64]
 

@@ -32,6 +32,7 @@ from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
 from synfeal.config.types import Strict
+from synfeal.dataset.depth_agreement import check_depth
 from synfeal.dataset.packed import fit_frame
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_sequence import Progress
@@ -49,7 +50,6 @@ from synfeal.records.files import (
 )
 from synfeal.records.provenance import provenance
 from synfeal.records.tables import read_records
-from synfeal.validation.depth_agreement import check_depth
 
 Array = NDArray[np.float64]
 

@@ -26,9 +26,11 @@ from synfeal.camera.calibration import Calibration
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.depth import MILLIMETRES
-from synfeal.dataset.finish import MANIFEST
+from synfeal.dataset.depth_agreement import check_depth
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.images import image_size, read_image
+from synfeal.dataset.known_camera import camera_of_dataset
+from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.packed import fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
@@ -39,8 +41,6 @@ from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import file_sha256, read_json, write_json
 from synfeal.scanning.camera import TUM_UNITS_PER_M, RgbdCamera, posed_depth
-from synfeal.validation.camera import camera_of_dataset
-from synfeal.validation.depth_agreement import check_depth
 
 log = logging.getLogger(__name__)
 

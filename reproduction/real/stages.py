@@ -29,9 +29,10 @@ from reproduction.real.split import (
     write_truth,
 )
 from synfeal.config.dataset import CameraConfig, RenderConfig
-from synfeal.dataset.finish import MANIFEST
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.images import read_image
+from synfeal.dataset.known_camera import camera_of_dataset
+from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.packed import fit_frame
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.posed_sequence import PosedFrames, read_posed_sequence
@@ -45,7 +46,6 @@ from synfeal.records.files import atomic_directory, read_json, write_json, write
 from synfeal.records.tables import write_numbers
 from synfeal.render.choose import open_renderer
 from synfeal.scanning.picture import compare, write_picture
-from synfeal.validation.camera import camera_of_dataset
 
 Array = NDArray[np.float64]
 POSES = ",".join((IMAGE, *COLUMNS[2:]))

@@ -23,9 +23,10 @@ from synfeal.collection.prepare import prepare_mesh, save_cartons
 from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig, DatasetConfig, Shade
 from synfeal.config.effects import MOST_PATH_OBJECTS
-from synfeal.dataset.finish import MANIFEST, finish_dataset
+from synfeal.dataset.finish import finish_dataset
 from synfeal.dataset.frame_files import SUFFIX
 from synfeal.dataset.layer_files import refuse_many_instances
+from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_pool import Studio, render_sequences
 from synfeal.dataset.render_sequence import Progress, resolved

@@ -13,6 +13,7 @@ from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
 from synfeal.dataset.frame_files import frame_file, sequence_at, sequence_names
 from synfeal.dataset.layer_files import ENCODING, MASKS, write_instances
+from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_frames, read_pose_table, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
@@ -34,8 +35,6 @@ from synfeal.records.files import file_sha256, read_json, write_json
 from synfeal.records.provenance import frame_versions
 from synfeal.records.tables import write_frame
 from synfeal.render.choose import graphics
-
-MANIFEST = "manifest.json"
 
 
 def finish_dataset(

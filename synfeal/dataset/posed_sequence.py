@@ -30,16 +30,16 @@ from synfeal.dataset.frame_files import (
     sequence_at,
     sequence_names,
 )
+from synfeal.dataset.pose_table import UNIT_TOLERANCE
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import interpolate, pose_from_quat
+from synfeal.geometry.rigid import refuse_non_rigid
 from synfeal.records.files import lies_in
 
 COLOR_SUFFIXES = ("png", "jpg", "jpeg")
 FRAME = re.compile(r"frame-(\d+)\.(color\.(?:png|jpg|jpeg)|depth\.png|pose\.txt)")
 RGB_LIST, DEPTH_LIST, TRAJECTORY = "rgb.txt", "depth.txt", "groundtruth.txt"
-# Poses hold few digits in other people's files.
-RIGID_BOUND = 1e-3
 # Largest distance in time between a photograph and its depth image, and between a photograph and
 # each of the two poses it lies between: what the benchmark's own ``associate.py`` takes, and ten
 # poses of its motion capture.
@@ -231,15 +231,6 @@ def _pose(path: FrameFile) -> Array | None:
     return pose
 
 
-def refuse_non_rigid(pose: Array, path: object) -> None:
-    """Check that a pose (4, 4) of ``path`` is a rotation and a translation."""
-    rotation = pose[:3, :3].clip(-2.0, 2.0)  # anything beyond 1 is none, and must not overflow
-    orthonormal = np.abs(rotation @ rotation.T - np.eye(3)).max() <= RIGID_BOUND
-    last_row = np.abs(pose[3] - [0.0, 0.0, 0.0, 1.0]).max() <= RIGID_BOUND
-    if not (orthonormal and last_row and np.linalg.det(rotation) > 0.0):
-        raise InputError(f"{path}: is not a rigid pose; its upper left 3x3 must be a rotation")
-
-
 def _chosen(sequence: PosedFrames, frames: slice | None, path: Path) -> PosedFrames:
     chosen = sequence if frames is None else sequence[frames]
     if not len(chosen):
@@ -327,7 +318,7 @@ def _read_trajectory(path: Path) -> tuple[Array, Array]:
                 f"{path}: line {number} must hold eight finite numbers: timestamp tx ty tz qx qy"
                 " qz qw"
             )
-        if abs(float(np.linalg.norm(numbers[4:])) - 1.0) > RIGID_BOUND * 10:
+        if abs(float(np.linalg.norm(numbers[4:])) - 1.0) > UNIT_TOLERANCE:
             raise InputError(f"{path}: line {number} holds a quaternion that is not of length 1")
         values.append(numbers)
     if len(values) < 2:

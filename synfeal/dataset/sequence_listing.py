@@ -8,12 +8,20 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from synfeal.dataset.frame_files import FrameFile, frame_file, is_archive, sequence_names
+from synfeal.dataset.frame_files import (
+    SUFFIX,
+    FrameFile,
+    foreign_members,
+    frame_file,
+    is_archive,
+    sequence_at,
+    sequence_names,
+)
 from synfeal.errors import InputError, read_as
 
 COLOR, DEPTH, POSE = "color.png", "depth.png", "pose.txt"
@@ -149,3 +157,55 @@ def gap_in(sequence: SequenceListing) -> Frame | None:
 def is_sequence(path: Path) -> bool:
     """Tell whether a path is a sequence, as a folder or as an archive."""
     return path.is_dir() or is_archive(path)
+
+
+def list_sequences(dataset: Path) -> list[SequenceListing]:
+    """List the sequences of a data set in order of their numbers.
+
+    Raises:
+        InputError: ``dataset`` is not a directory, holds no ``seq-XX``, or an archive is damaged.
+    """
+    if not dataset.is_dir():
+        raise InputError(f"{dataset}: is not a directory; give the directory that holds seq-01")
+    names = {path.name.removesuffix(SUFFIX) for path in dataset.glob("seq-*")}
+    paths = [sequence_at(dataset / name) for name in names if name[4:].isdecimal()]
+    found = [path for path in paths if is_sequence(path)]
+    if not found:
+        raise InputError(
+            f"{dataset}: holds no seq-01 and no seq-01{SUFFIX}; give the directory of a 7-Scenes"
+            " data set"
+        )
+    found.sort(key=lambda path: (int(path.stem[4:]), path.stem))
+    return [list_sequence(path) for path in found]
+
+
+def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
+    """List the kinds of file every frame must have: layers and right images only if any has."""
+    listed = list(sequences)
+    return tuple(
+        kind
+        for kind in (COLOR, DEPTH, NORMAL, MASK, POSE, RIGHT_COLOR, RIGHT_DEPTH)
+        if kind in (COLOR, POSE) or any(sequence.numbers[kind] for sequence in listed)
+    )
+
+
+def name_problems(sequences: Sequence[SequenceListing]) -> tuple[str, ...]:
+    """Describe frames that are not numbered 0, 1, 2, ... or lack a file, and ambiguous files."""
+    kinds = kinds_of(sequences)
+    problems = [problem for sequence in sequences for problem in sequence.problems]
+    problems += [problem for sequence in sequences for problem in _gaps(sequence, kinds)]
+    return tuple(problems)
+
+
+def _gaps(sequence: SequenceListing, kinds: Iterable[str]) -> Iterable[str]:
+    if not sequence.frames:
+        yield f"{sequence.path}: holds no frame"
+        return
+    if is_archive(sequence.path):
+        for name in foreign_members(sequence.path):
+            yield f"{sequence.path}: '{name[:80]}' does not unpack to one file in {sequence.name}"
+    for number in range(sequence.frames[-1].number + 1):
+        frame = Frame(sequence.path, number)
+        for kind in kinds:
+            if number not in sequence.numbers[kind]:
+                yield f"{frame.path(kind)}: missing"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -133,3 +134,53 @@ def _frame_name(image: str) -> str | None:
     """Return ``seq-01/frame-000000`` for the name of an image; None for other names."""
     match = _IMAGE_NAME.fullmatch(image)
     return f"{match[1]}/{match[2]}" if match else None
+
+
+Splits = dict[str, list[SequenceListing]]
+
+
+def read_splits(
+    dataset: Path, sequences: Iterable[SequenceListing]
+) -> tuple[Splits, tuple[str, ...]]:
+    """List the sequences of each readable split in order, and what is wrong with the files."""
+    by_path = {sequence.path: sequence for sequence in sequences}
+    splits: Splits = {}
+    failures: list[str] = []
+    for split, name in SPLIT_FILES.items():
+        try:
+            directories = read_split(dataset, split)
+        except InputError as error:
+            failures.append(str(error))
+            continue
+        failures += [
+            f"{dataset / name}: lists {path.name}, which is not there"
+            for path in directories
+            if path not in by_path
+        ]
+        splits[split] = [by_path[path] for path in directories if path in by_path]
+    return splits, tuple(failures)
+
+
+def split_problems(
+    dataset: Path,
+    sequences: Iterable[SequenceListing],
+    splits: Mapping[str, list[SequenceListing]],
+    unreadable: tuple[str, ...],
+) -> tuple[str, ...]:
+    """Describe sequences that are not in one split, once; see :func:`read_splits`.
+
+    Args:
+        dataset: The data set.
+        sequences: All of its sequences.
+        splits: Sequences by split.
+        unreadable: What is wrong with the files that list the splits. If anything is, a sequence
+            may be in no split.
+    """
+    uses = Counter(sequence.name for listed in splits.values() for sequence in listed)
+    names = " and ".join(SPLIT_FILES.values())
+    problems = [
+        f"{dataset / sequence.name}: is listed {count} times in {names}, must be listed once"
+        for sequence in sequences
+        if (count := uses[sequence.name]) > 1 or not (count or unreadable)
+    ]
+    return (*unreadable, *problems)

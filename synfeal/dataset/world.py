@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError, read_as
+from synfeal.geometry.rigid import is_rigid
 from synfeal.records.files import read_json, write_json
 
 WORLD = "world.json"
 KEY = "sequence_from_world"
-RIGID_BOUND = 1e-6
 
 
 def read_sequence_from_world(folder: Path) -> NDArray[np.float64] | None:
@@ -74,18 +74,6 @@ def write_sequence_from_world(folder: Path, sequence_from_world: NDArray[np.floa
         sequence_from_world: Rigid motion (4, 4) from the data set's world to the sequence's.
     """
     write_json(folder / WORLD, {KEY: np.asarray(sequence_from_world, np.float64).tolist()})
-
-
-def is_rigid(matrix: NDArray[np.float64]) -> bool:
-    """Tell whether a matrix is (4, 4), a proper rotation, a translation and 0 0 0 1."""
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        return False
-    rotation = matrix[:3, :3].clip(-2.0, 2.0)  # anything beyond 1 is none, and must not overflow
-    return bool(
-        np.abs(rotation @ rotation.T - np.eye(3)).max() <= RIGID_BOUND
-        and np.linalg.det(rotation) > 0.0
-        and np.abs(matrix[3] - [0.0, 0.0, 0.0, 1.0]).max() <= RIGID_BOUND
-    )
 
 
 def read_scan_record(mesh: Path) -> dict[str, Any] | None:

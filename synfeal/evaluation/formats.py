@@ -31,21 +31,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, SEEN, SUPPORT
-from synfeal.dataset.sequence_listing import refuse_problems
+from synfeal.dataset.sequence_listing import POSE, list_sequences, refuse_problems
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
 from synfeal.evaluation.estimates import KITTI, Convention, Estimates, FrameKey
 from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.geometry.rigid import RIGID_BOUND, rigid_defects
 from synfeal.records.tables import is_number, parse_cells
-from synfeal.validation.listing import POSE, list_sequences
-from synfeal.validation.poses import rigid_defects
 
 Array = NDArray[np.float64]
 
 OURS, COLMAP = Convention("world_from_cam", "wxyz"), Convention("cam_from_world", "wxyz")
 TUM = Convention("world_from_cam", "xyzw")
 MODELS = ("images.txt", "images.bin")
-RIGID_BOUND = 1e-3  # text of few digits
 # 1973 in nanoseconds: what seconds, milliseconds and microseconds of today do not reach.
 LEAST_STAMP_NS = 10**17
 
@@ -363,7 +361,7 @@ def _of_matrices(
 def _quat_of_rotations(matrices: Array) -> Array:
     """Convert matrices (N, 4, 4) to quaternions (N, 4) ``wxyz``; NaN where one is not rigid."""
     quat = np.full((len(matrices), 4), np.nan)
-    rigid = rigid_defects(matrices).max(axis=1) <= RIGID_BOUND
+    rigid = rigid_defects(matrices).worst <= RIGID_BOUND
     quat[rigid] = quat_wxyz_of(matrices[rigid])
     return quat
 

@@ -11,19 +11,24 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.finish import MANIFEST
 from synfeal.dataset.frame_files import sequence_at
+from synfeal.dataset.frame_poses import read_poses, rigid_problems
+from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.pose_table import IMAGE, read_pose_table
 from synfeal.dataset.posed_sequence import is_tum, read_posed_sequence
-from synfeal.dataset.sequence_listing import POSE, gap_in, refuse_problems
+from synfeal.dataset.sequence_listing import (
+    POSE,
+    Frame,
+    SequenceListing,
+    frames_of,
+    gap_in,
+    list_sequences,
+    refuse_problems,
+)
 from synfeal.dataset.sevenscenes import SPLIT_FILES
-from synfeal.dataset.split_frames import rows_of_frames, table_problems
+from synfeal.dataset.split_frames import read_splits, rows_of_frames, table_problems
 from synfeal.errors import InputError
 from synfeal.evaluation.estimates import KITTI, Estimates, FrameKey
-from synfeal.validation.frames import read_poses
-from synfeal.validation.listing import Frame, SequenceListing, frames_of, list_sequences
-from synfeal.validation.manifest import read_splits
-from synfeal.validation.poses import check_rigid, rigid_bound
 
 Array = NDArray[np.float64]
 
@@ -91,7 +96,7 @@ def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
     _check_tables(dataset, split, everything)
     frames = tuple(frames_of(sequences))
     poses, unreadable = read_poses(sequences)
-    problems = check_rigid(poses, unreadable, rigid_bound(dataset)).failures
+    problems = (*unreadable, *rigid_problems(poses))
     missing = [frame for frame in frames if frame not in poses]
     if problems or missing:
         reason = problems[0] if problems else f"{missing[0].path('pose.txt')}: missing"

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.known_camera import camera_of_dataset
 from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.sequence_listing import DEPTH
 from synfeal.errors import InputError, why
 from synfeal.evaluation.bootstrap import FEWEST_PATHS
 from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates, checked_convention
@@ -23,8 +25,6 @@ from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
 from synfeal.geometry.limits import FARTHEST_M
 from synfeal.geometry.poses import quat_wxyz_of, umeyama_sim3
 from synfeal.records.progress import Progress
-from synfeal.validation.camera import camera_of_dataset
-from synfeal.validation.listing import DEPTH
 
 Array = NDArray[np.float64]
 Align = Literal["none", "se3", "sim3"]

@@ -16,23 +16,24 @@ from numpy.typing import NDArray
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.depth import is_measured, read_depth_units
 from synfeal.dataset.frame_files import FrameFile, encode_png
+from synfeal.dataset.frame_poses import compare_tables, read_poses, rigid_problems
 from synfeal.dataset.images import image_size
-from synfeal.dataset.sevenscenes import SPLIT_FILES
-from synfeal.errors import InputError
-from synfeal.geometry.poses import moved_right
-from synfeal.validation.camera import camera_of_dataset
-from synfeal.validation.frames import check_names, kinds_of, read_poses
-from synfeal.validation.listing import (
+from synfeal.dataset.known_camera import camera_of_dataset
+from synfeal.dataset.sequence_listing import (
     COLOR,
     DEPTH,
     RIGHT_COLOR,
     RIGHT_DEPTH,
     Frame,
     frames_of,
+    kinds_of,
     list_sequences,
+    name_problems,
 )
-from synfeal.validation.manifest import check_splits, read_splits
-from synfeal.validation.poses import check_rigid, check_tables, rigid_bound
+from synfeal.dataset.sevenscenes import SPLIT_FILES
+from synfeal.dataset.split_frames import read_splits, split_problems
+from synfeal.errors import InputError
+from synfeal.geometry.poses import moved_right
 
 RIGHT = "-right"
 # Links or copies the image of a frame; without a target it only counts the frame as written.
@@ -101,13 +102,10 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
         )
     splits, split_failures = read_splits(dataset, sequences)
     poses, unreadable = read_poses(sequences)
-    problems = (
-        check_names(sequences).failures
-        + check_rigid(poses, unreadable, rigid_bound(dataset)).failures
-    )
+    problems = (*name_problems(sequences), *unreadable, *rigid_problems(poses))
     if any((dataset / name).exists() for name in SPLIT_FILES.values()):
-        problems += check_splits(dataset, sequences, splits, split_failures).failures
-        problems += check_tables(dataset, poses, splits).failures
+        problems += split_problems(dataset, sequences, splits, split_failures)
+        problems += compare_tables(dataset, poses, splits).problems
     split_of = {s.path: split for split, listed in splits.items() for s in listed}
     if problems:
         raise InputError(f"{problems[0]}; synfeal validate says more")

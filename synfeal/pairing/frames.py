@@ -12,14 +12,20 @@ from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.depth import read_depth_m
+from synfeal.dataset.depth_agreement import PosedDepth
+from synfeal.dataset.frame_poses import read_poses, rigid_problems
+from synfeal.dataset.known_camera import camera_of_dataset
+from synfeal.dataset.sequence_listing import (
+    COLOR,
+    DEPTH,
+    Frame,
+    kinds_of,
+    list_sequences,
+    name_problems,
+)
 from synfeal.dataset.sevenscenes import SPLIT_FILES
+from synfeal.dataset.split_frames import read_splits, split_problems
 from synfeal.errors import InputError
-from synfeal.validation.camera import camera_of_dataset
-from synfeal.validation.depth_agreement import PosedDepth
-from synfeal.validation.frames import check_names, kinds_of, read_poses
-from synfeal.validation.listing import COLOR, DEPTH, Frame, list_sequences
-from synfeal.validation.manifest import check_splits, read_splits
-from synfeal.validation.poses import check_rigid, rigid_bound
 
 log = logging.getLogger("synfeal")
 
@@ -95,12 +101,11 @@ def read_depth_frames(
     if camera.assumed:
         log.warning("%s: says nothing of its camera; that of 7-Scenes is assumed", dataset)
     poses, unreadable = read_poses(sequences)
-    problems = check_names(sequences).failures
-    problems += check_rigid(poses, unreadable, rigid_bound(dataset)).failures
+    problems = (*name_problems(sequences), *unreadable, *rigid_problems(poses))
     split_of: dict[Path, str] = {}
     if any((dataset / name).exists() for name in SPLIT_FILES.values()):
         listed, split_failures = read_splits(dataset, sequences)
-        problems += check_splits(dataset, sequences, listed, split_failures).failures
+        problems += split_problems(dataset, sequences, listed, split_failures)
         split_of = {s.path: split for split, own in listed.items() for s in own}
     if problems:
         raise InputError(f"{problems[0]}; synfeal validate says more")

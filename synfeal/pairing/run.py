@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from synfeal.dataset.depth_agreement import check_depth
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error
 from synfeal.pairing.choose import Choice
@@ -26,7 +27,6 @@ from synfeal.records.files import (
     write_text,
 )
 from synfeal.records.tables import MAYBE_TEXT, NUMBER, TEXT, read_frame, rows_of, write_frame
-from synfeal.validation.depth_agreement import check_depth
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from synfeal.camera.calibration import Calibration
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
-from synfeal.dataset.finish import MANIFEST
+from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.dataset.world import read_scan_record, rigid_motion_of
 from synfeal.errors import InputError, read_as

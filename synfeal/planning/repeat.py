@@ -14,10 +14,9 @@ from synfeal.dataset.sequence_listing import POSE, list_sequence
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_pose, read_split
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.geometry.rigid import refuse_non_rigid
 from synfeal.geometry.rotations import canonical_quat_wxyz
 
-# Rotations are accepted within this: files of other programs hold few digits.
-TOLERANCE = 1e-2
 TUM_ROW = "timestamp tx ty tz qx qy qz qw"
 
 log = logging.getLogger("synfeal")
@@ -106,11 +105,7 @@ def _read_frames(directories: list[Path], source: Path) -> PoseTable:
 def _rigid(path: FrameFile) -> NDArray[np.float64]:
     """Read a pose (4, 4) that is a rotation and a translation."""
     pose = read_pose(path)
-    rotation = pose[:3, :3].clip(-2.0, 2.0)  # anything beyond 1 is none, and must not overflow
-    orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), rtol=0.0, atol=TOLERANCE)
-    last_row = np.allclose(pose[3], [0.0, 0.0, 0.0, 1.0], rtol=0.0, atol=TOLERANCE)
-    if not (orthonormal and last_row and np.linalg.det(rotation) > 0.0):
-        raise InputError(f"{path}: is not a rigid pose; its upper left 3x3 must be a rotation")
+    refuse_non_rigid(pose, path)
     return pose
 
 

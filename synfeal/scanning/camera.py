@@ -15,14 +15,14 @@ from scipy.spatial.transform import Rotation
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
 from synfeal.dataset.depth import MILLIMETRES, Depth, read_depth_m
-from synfeal.dataset.finish import MANIFEST
+from synfeal.dataset.depth_agreement import PosedDepth
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.images import read_rgb
+from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import pose_matrix
 from synfeal.records.files import read_json
-from synfeal.validation.depth_agreement import PosedDepth
 
 Array = NDArray[np.float64]
 TUM_UNITS_PER_M = 5000.0  # what the TUM benchmark stores a metre of depth as

@@ -22,12 +22,12 @@ from scipy.optimize import minimize
 
 from synfeal.camera.projection import Intrinsics
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth_agreement import spread
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.geometry.poses import inverse
 from synfeal.scanning.camera import RgbdCamera
 from synfeal.scanning.fusion import FusedSurface
 from synfeal.scanning.seen import Floats, project, sampled, seen_points, within
-from synfeal.validation.depth_agreement import spread
 
 N_POINTS, N_FRAMES = 40_000, 60
 SHRINK = 2  # sides of photographs: averages noise and compression, and widens the valley

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.dataset.depth_agreement import DepthAgreement, best_focal_px, check_depth, spread
 from synfeal.dataset.images import image_size
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
 from synfeal.dataset.render_sequence import Progress
@@ -36,12 +37,6 @@ from synfeal.scanning.consistency import ColorFit, fit_color, sightings_of, with
 from synfeal.scanning.fusion import FusedSurface, fuse
 from synfeal.scanning.gravity import Gravity, find_gravity, upright_world
 from synfeal.scanning.picture import Comparison, compare, write_picture
-from synfeal.validation.depth_agreement import (
-    DepthAgreement,
-    best_focal_px,
-    check_depth,
-    spread,
-)
 
 Array = NDArray[np.float64]
 OPTIONS = frozenset({"--poses-are", "--depth-scale"})

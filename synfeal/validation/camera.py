@@ -1,65 +1,15 @@
-"""Camera of the frames, and rays through its pixels by other code than the renderers'."""
+"""Rays through the pixels of a camera, by other code than the renderers'."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from synfeal.camera.fisheye import EQUIDISTANT
 from synfeal.camera.projection import pixels_per_radian
 from synfeal.config.dataset import CameraConfig
-from synfeal.config.load import describe
-from synfeal.dataset.finish import MANIFEST
-from synfeal.errors import InputError
-from synfeal.validation.manifest import read_manifest
-
-# Depth and colour of 7-Scenes come from the two cameras of a Kinect. The focal length that its
-# authors give is that of depth; with that of colour photographs and depth agree (docs/scanning.md).
-SEVEN_SCENES = CameraConfig(width=640, height=480, fx=525.0, fy=525.0, cx=320.0, cy=240.0)
-SEVEN_SCENES_DEPTH = SEVEN_SCENES.model_copy(update={"fx": 585.0, "fy": 585.0})
-
-
-@dataclass(frozen=True)
-class KnownCamera:
-    """A camera and where it is known from."""
-
-    config: CameraConfig  # its intrinsics and distortion
-    source: str  # for the report
-    assumed: bool = False  # nothing says that this is the camera
-    of_depth: CameraConfig | None = None  # that of the depth images, where it is another one
-
-    @property
-    def depth(self) -> CameraConfig:
-        """The camera of the depth images."""
-        return self.of_depth or self.config
-
-
-def camera_of_dataset(dataset: Path, camera_file: Path | None) -> KnownCamera:
-    """Read the camera of a data set; a calibration file takes precedence over the manifest."""
-    if camera_file is not None:
-        from synfeal.camera.calibration import read_calibration
-
-        lens = asdict(read_calibration(camera_file, with_fisheye=True))
-        return KnownCamera(_config(camera_file, lens), str(camera_file))
-    path = dataset / MANIFEST
-    if not path.exists():
-        return KnownCamera(
-            SEVEN_SCENES, "assumed: that of 7-Scenes", assumed=True, of_depth=SEVEN_SCENES_DEPTH
-        )
-    return KnownCamera(_config(path, read_manifest(dataset).get("camera")), MANIFEST)
-
-
-def _config(path: Path, values: object) -> CameraConfig:
-    try:
-        return CameraConfig.model_validate(values)
-    except ValidationError as error:
-        raise InputError(f"{path}: camera: {describe(error)}") from error
-
 
 Array = NDArray[np.float64]
 

@@ -19,20 +19,14 @@ from scipy.ndimage import map_coordinates
 from synfeal.camera.projection import horizontal_fov_rad, normalised_of_pixels, pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.depth import read_depth_m
+from synfeal.dataset.frame_poses import Poses
 from synfeal.dataset.images import read_rgb
+from synfeal.dataset.known_camera import KnownCamera
+from synfeal.dataset.sequence_listing import COLOR, DEPTH, RIGHT_COLOR, RIGHT_DEPTH, Frame
 from synfeal.errors import InputError
 from synfeal.geometry.poses import moved_right, pose_error
-from synfeal.validation.camera import KnownCamera, Lens, lens_of
-from synfeal.validation.frames import Poses
-from synfeal.validation.listing import (
-    COLOR,
-    DEPTH,
-    PNG,
-    RIGHT_COLOR,
-    RIGHT_DEPTH,
-    Check,
-    Frame,
-)
+from synfeal.validation.camera import Lens, lens_of
+from synfeal.validation.check import PNG, Check
 from synfeal.validation.poses import GAPS
 from synfeal.validation.reprojection import ComparedFrame, Residual, camera_normal, compare
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -12,26 +12,22 @@ from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.depth import DepthUnits, is_measured, read_depth_units
-from synfeal.dataset.frame_files import FrameFile, foreign_members, is_archive
+from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.images import LOOKED_AT, is_of_one_color, read_rgb
-from synfeal.dataset.sevenscenes import read_pose
-from synfeal.errors import InputError
-from synfeal.validation.listing import (
+from synfeal.dataset.sequence_listing import (
     COLOR,
     DEPTH,
-    MASK,
-    NORMAL,
-    PNG,
-    POSE,
     RIGHT_COLOR,
     RIGHT_DEPTH,
-    Check,
     Frame,
     SequenceListing,
     frames_of,
+    kinds_of,
+    name_problems,
 )
+from synfeal.errors import InputError
+from synfeal.validation.check import PNG, Check
 
-Poses = dict[Frame, NDArray[np.float64]]
 Pixels = NDArray[Any]
 
 # Share of the frames: a camera may come close to a plain wall, and rooms without a ceiling have
@@ -45,38 +41,13 @@ REMEDIES = {
 }
 
 
-def kinds_of(sequences: Iterable[SequenceListing]) -> tuple[str, ...]:
-    """List the kinds of file every frame must have: layers and right images only if any has."""
-    listed = list(sequences)
-    return tuple(
-        kind
-        for kind in (COLOR, DEPTH, NORMAL, MASK, POSE, RIGHT_COLOR, RIGHT_DEPTH)
-        if kind in (COLOR, POSE) or any(sequence.numbers[kind] for sequence in listed)
-    )
-
-
 def check_names(sequences: Sequence[SequenceListing]) -> Check:
     """Check that frames are numbered 0, 1, 2, ... and have a file of each kind."""
     kinds = kinds_of(sequences)
-    failures = [problem for sequence in sequences for problem in sequence.problems]
-    failures += [failure for sequence in sequences for failure in _gaps(sequence, kinds)]
+    failures = name_problems(sequences)
     n_frames = len(frames_of(sequences))
     text = f"{n_frames} frames in {len(sequences)} sequences, each with {', '.join(kinds)}"
-    return Check("names", text, tuple(failures))
-
-
-def _gaps(sequence: SequenceListing, kinds: Iterable[str]) -> Iterable[str]:
-    if not sequence.frames:
-        yield f"{sequence.path}: holds no frame"
-        return
-    if is_archive(sequence.path):
-        for name in foreign_members(sequence.path):
-            yield f"{sequence.path}: '{name[:80]}' does not unpack to one file in {sequence.name}"
-    for number in range(sequence.frames[-1].number + 1):
-        frame = Frame(sequence.path, number)
-        for kind in kinds:
-            if number not in sequence.numbers[kind]:
-                yield f"{frame.path(kind)}: missing"
+    return Check("names", text, failures)
 
 
 def check_images(
@@ -164,17 +135,3 @@ def _is_mostly_empty(rgb: Pixels, depth_mm: DepthUnits | None) -> bool:
     black = (rgb[::LOOKED_AT, ::LOOKED_AT] == 0).all(axis=2)
     empty = black if depth_mm is None else ~is_measured(depth_mm)
     return bool(np.mean(empty) > 0.5)
-
-
-def read_poses(sequences: Iterable[SequenceListing]) -> tuple[Poses, tuple[str, ...]]:
-    """Read the poses (4, 4) of all readable frames, and what is wrong with the others."""
-    poses: Poses = {}
-    failures: list[str] = []
-    for sequence in sequences:
-        for number in sorted(sequence.numbers[POSE]):
-            frame = Frame(sequence.path, number)
-            try:
-                poses[frame] = read_pose(frame.path(POSE))
-            except InputError as error:
-                failures.append(str(error))
-    return poses, tuple(failures)

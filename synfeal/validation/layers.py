@@ -27,16 +27,9 @@ from synfeal.dataset.layer_files import (
     read_instances,
     read_mask,
 )
+from synfeal.dataset.sequence_listing import DEPTH, MASK, NORMAL, Frame, SequenceListing
 from synfeal.errors import InputError
-from synfeal.validation.listing import (
-    DEPTH,
-    MASK,
-    NORMAL,
-    PNG,
-    Check,
-    Frame,
-    SequenceListing,
-)
+from synfeal.validation.check import PNG, Check
 
 MOST_COMPARED = 60  # frames whose normals are compared with depth
 COLUMNS, ROWS = 16, 12  # of the cells

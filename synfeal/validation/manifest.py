@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
-from synfeal.dataset.finish import MANIFEST, sequence_sha256
-from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
-from synfeal.errors import InputError, read_as, why
-from synfeal.records.files import read_json
-from synfeal.validation.listing import Check, SequenceListing
+from synfeal.dataset.finish import sequence_sha256
+from synfeal.dataset.manifest import MANIFEST, read_manifest
+from synfeal.dataset.sequence_listing import SequenceListing
+from synfeal.dataset.sevenscenes import SPLIT_FILES
+from synfeal.dataset.split_frames import split_problems
+from synfeal.errors import InputError, why
+from synfeal.validation.check import Check
 
 
 def check_manifest(
@@ -87,45 +87,6 @@ def has_headlight(dataset: Path) -> bool:
     return isinstance(render, dict) and render.get("shade") == "headlight"
 
 
-def read_manifest(dataset: Path) -> dict[str, Any]:
-    """Read the manifest as it stands.
-
-    Raises:
-        InputError: it cannot be read as a JSON object.
-    """
-    path = dataset / MANIFEST
-    with read_as(path, "a manifest"):
-        manifest = read_json(path)
-    if not isinstance(manifest, dict):
-        raise InputError(f"{path}: cannot be read as a manifest (no JSON object)")
-    return manifest
-
-
-Splits = dict[str, list[SequenceListing]]
-
-
-def read_splits(
-    dataset: Path, sequences: Iterable[SequenceListing]
-) -> tuple[Splits, tuple[str, ...]]:
-    """List the sequences of each readable split in order, and what is wrong with the files."""
-    by_path = {sequence.path: sequence for sequence in sequences}
-    splits: Splits = {}
-    failures: list[str] = []
-    for split, name in SPLIT_FILES.items():
-        try:
-            directories = read_split(dataset, split)
-        except InputError as error:
-            failures.append(str(error))
-            continue
-        failures += [
-            f"{dataset / name}: lists {path.name}, which is not there"
-            for path in directories
-            if path not in by_path
-        ]
-        splits[split] = [by_path[path] for path in directories if path in by_path]
-    return splits, tuple(failures)
-
-
 def check_splits(
     dataset: Path,
     sequences: Iterable[SequenceListing],
@@ -141,14 +102,9 @@ def check_splits(
         unreadable: What is wrong with the files that list the splits, see :func:`read_splits`. If
             anything is, a sequence may be in no split.
     """
-    uses = Counter(sequence.name for listed in splits.values() for sequence in listed)
     names = " and ".join(SPLIT_FILES.values())
-    failures = [
-        f"{dataset / sequence.name}: is listed {count} times in {names}, must be listed once"
-        for sequence in sequences
-        if (count := uses[sequence.name]) > 1 or not (count or unreadable)
-    ]
+    failures = split_problems(dataset, sequences, splits, unreadable)
     parts = [
         f"{split} {sum(len(s.frames) for s in listed)} frames" for split, listed in splits.items()
     ]
-    return Check("splits", ", ".join(parts) or names, (*unreadable, *failures))
+    return Check("splits", ", ".join(parts) or names, failures)

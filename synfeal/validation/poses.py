@@ -2,114 +2,45 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from synfeal.dataset.finish import MANIFEST
-from synfeal.dataset.pose_table import read_pose_table
-from synfeal.dataset.split_frames import rows_of_frames, table_problems
-from synfeal.errors import InputError
-from synfeal.validation.frames import Poses
-from synfeal.validation.listing import POSE, Check, Frame, SequenceListing, frames_of
-
-# Text with ten decimals is exact to 1e-10.
-ORTHONORMAL_BOUND = 1e-6
-# KinectFusion integrates rotations in single precision: the determinants of 7-Scenes' own poses are
-# up to a few 1e-4 from 1.
-FOREIGN_ORTHONORMAL_BOUND = 1e-3
-TABLE_BOUND = 1e-8  # of a number up to 100; of larger ones the same eleven digits
-TABLE_RATIO = 1e-10
+from synfeal.dataset.frame_poses import Poses, compare_tables, rigid_problems
+from synfeal.dataset.sequence_listing import POSE, Frame, SequenceListing, frames_of
+from synfeal.geometry.rigid import RIGID_BOUND, is_rigid, rigid_defects
+from synfeal.validation.check import Check
 
 
-def rigid_bound(dataset: Path) -> float:
-    """Return how far from rigid the poses of a data set may be: less where it is one of ours."""
-    ours = os.path.lexists(dataset / MANIFEST)
-    return ORTHONORMAL_BOUND if ours else FOREIGN_ORTHONORMAL_BOUND
-
-
-def check_rigid(poses: Poses, unreadable: tuple[str, ...], bound: float) -> Check:
+def check_rigid(poses: Poses, unreadable: tuple[str, ...]) -> Check:
     """Check that rotations are orthonormal with determinant +1 and the last row is 0 0 0 1.
 
     Args:
         poses: Of each frame.
         unreadable: What is wrong with those that could not be read.
-        bound: Largest difference of any of these numbers, see :func:`rigid_bound`.
     """
-    names = ("R'R differs from 1", "det R differs from +1", "the last row differs from 0 0 0 1")
-    defects = rigid_defects(np.array(list(poses.values())).reshape(-1, 4, 4))
-    failures = [
-        f"{frame.path(POSE)}: no rigid pose, {names[row.argmax()]} by {row.max():.2g}"
-        for frame, row in zip(poses, defects, strict=True)
-        if row.max() > bound
-    ]
-    worst = defects.max(initial=0.0)
-    text = f"{len(poses)} poses, farthest from rigid {worst:.1e} (bound {bound:g})"
-    return Check("poses", text, (*unreadable, *failures))
+    worst = rigid_defects(np.array(list(poses.values()))).worst.max(initial=0.0)
+    text = f"{len(poses)} poses, farthest from rigid {worst:.1e} (bound {RIGID_BOUND:g})"
+    return Check("poses", text, (*unreadable, *rigid_problems(poses)))
 
 
-def rigid_defects(pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Measure defects (N, 3) of poses (N, 4, 4): orthonormality, determinant, last row."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        rotation = pose[:, :3, :3]
-        gram = np.swapaxes(rotation, 1, 2) @ rotation
-        orthonormal = np.abs(gram - np.eye(3)).max(axis=(1, 2))
-        determinant = np.abs(np.linalg.det(rotation) - 1.0)
-    last_row = np.abs(pose[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1)
-    defects = np.stack([orthonormal, determinant, last_row], axis=1)
-    return np.asarray(np.nan_to_num(defects, nan=np.inf))
-
-
-def rigid_poses(poses: Poses, bound: float) -> Poses:
+def rigid_poses(poses: Poses) -> Poses:
     """Select the poses that can be used; :func:`check_rigid` names the others."""
-    return {
-        frame: pose for frame, pose in poses.items() if rigid_defects(pose[None]).max() <= bound
-    }
+    return {frame: pose for frame, pose in poses.items() if is_rigid(pose)}
 
 
 def check_tables(
     dataset: Path, poses: Poses, splits: Mapping[str, Iterable[SequenceListing]]
 ) -> Check:
     """Check that the poses of the frames are those of ``train.csv`` and ``test.csv``."""
-    failures: list[str] = []
-    differences: list[float] = []
-    bound = TABLE_BOUND
-    for split, sequences in splits.items():
-        path, frames = dataset / f"{split}.csv", frames_of(sequences)
-        if not path.exists():
-            continue
-        try:
-            table = read_pose_table(path)
-        except InputError as error:
-            failures.append(str(error))
-            continue
-        if problems := table_problems(path, frames):
-            failures += problems
-            continue
-        bound = max(bound, TABLE_RATIO * float(np.abs(table.position_m).max(initial=0.0)))
-        matrices = table.world_from_cam[rows_of_frames(path, frames)]
-        for frame, row in zip(frames, matrices, strict=True):
-            if frame in poses:
-                differences.append(float(np.abs(poses[frame] - row).max()))
-                if differences[-1] > bound:
-                    wrong = f"differs from {path.name} by {differences[-1]:.2g}"
-                    failures.append(f"{frame.path(POSE)}: {wrong}")
-        rows = np.flatnonzero(table.quat_wxyz[:, 0] < 0.0)
-        if len(rows):
-            failures.append(
-                f"{path}: row {rows[0] + 2} and {len(rows) - 1} others hold quaternions with"
-                " qw < 0; of the two of a rotation the one with qw >= 0 belongs here: change the"
-                " sign of all four numbers"
-            )
-    if not differences and not failures:
+    found = compare_tables(dataset, poses, splits)
+    if not found.differences and not found.problems:
         return Check("tables", "no train.csv or test.csv", skipped=True)
-    worst = max(differences, default=0.0)
-    text = f"{len(differences)} poses, farthest from its row {worst:.1e} (bound {bound:.1g})"
-    return Check("tables", text, tuple(failures))
+    worst = max(found.differences, default=0.0)
+    text = f"{len(found.differences)} poses, farthest from its row {worst:.1e}"
+    return Check("tables", f"{text} (bound {found.bound:.1g})", found.problems)
 
 
 def check_leaks(poses: Poses, splits: Mapping[str, list[SequenceListing]]) -> Check:

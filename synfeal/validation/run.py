@@ -9,36 +9,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.depth import read_depth_m
-from synfeal.errors import InputError
-from synfeal.records.progress import Progress
-from synfeal.validation.camera import KnownCamera, camera_of_dataset
-from synfeal.validation.consistency import check_consistency, check_stereo
-from synfeal.validation.depth_agreement import PosedDepth, compare_depth
-from synfeal.validation.frames import Poses, check_images, check_names, kinds_of, read_poses
-from synfeal.validation.layers import check_layers
-from synfeal.validation.listing import (
+from synfeal.dataset.depth_agreement import PosedDepth, compare_depth
+from synfeal.dataset.frame_poses import Poses, read_poses
+from synfeal.dataset.known_camera import KnownCamera, camera_of_dataset
+from synfeal.dataset.sequence_listing import (
     DEPTH,
     MASK,
     NORMAL,
     RIGHT_COLOR,
     RIGHT_DEPTH,
-    Check,
     SequenceListing,
     frames_of,
+    kinds_of,
     list_sequences,
 )
-from synfeal.validation.manifest import (
-    check_manifest,
-    check_splits,
-    has_headlight,
-    read_splits,
-)
+from synfeal.dataset.split_frames import read_splits
+from synfeal.errors import InputError
+from synfeal.records.progress import Progress
+from synfeal.validation.check import Check
+from synfeal.validation.consistency import check_consistency, check_stereo
+from synfeal.validation.frames import check_images, check_names
+from synfeal.validation.layers import check_layers
+from synfeal.validation.manifest import check_manifest, check_splits, has_headlight
 from synfeal.validation.poses import (
     check_leaks,
     check_rigid,
     check_tables,
     choose_pairs,
-    rigid_bound,
     rigid_poses,
 )
 
@@ -70,14 +67,13 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     n_frames = len(frames_of(sequences))
     size = None if camera is None or camera.assumed else camera.config
     poses, pose_failures = read_poses(sequences)
-    bound = rigid_bound(dataset)
     n_layers = len({NORMAL, MASK} & set(kinds_of(sequences)))
     with Progress((2 + n_layers) * n_frames, "frame", "validate") as progress:
         checks = [
             check_names(sequences),
             *check_images(sequences, size, progress.update),
             *check_layers(dataset, sequences, size, progress.update),
-            check_rigid(poses, pose_failures, bound),
+            check_rigid(poses, pose_failures),
             check_tables(dataset, poses, splits),
             check_splits(dataset, sequences, splits, split_failures),
             check_leaks(poses, splits),
@@ -85,7 +81,7 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
         ]
     if camera is None:
         return [*checks, Check("camera", "unknown", camera_failures)]
-    rigid = rigid_poses(poses, bound)
+    rigid = rigid_poses(poses)
     geometry = _geometry(sequences, rigid, camera, every_pair)
     if has_headlight(dataset):
         geometry = [_unjudged(c) if c.name in OF_COLORS else c for c in geometry]

@@ -31,6 +31,7 @@ from synfeal.camera.calibration import read_calibration
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.depth import read_depth_units
 from synfeal.dataset.images import read_rgb
+from synfeal.dataset.known_camera import camera_of_dataset
 from synfeal.dataset.packed import pack_frames, read_packed
 from synfeal.dataset.packed import write_packed as write_joined
 from synfeal.dataset.pose_table import read_pose_table, write_pose_table
@@ -40,7 +41,6 @@ from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.planning.repeat import read_poses
 from synfeal.records.files import write_json
-from synfeal.validation.camera import camera_of_dataset
 from synfeal.validation.run import validate
 from tests.support import mesh_samples as meshes
 from tests.support.colored_frames import save, untrained

@@ -17,10 +17,10 @@ import synfeal
 from synfeal.cli import main
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import read_pose_table
+from synfeal.dataset.sequence_listing import list_sequences
 from synfeal.dataset.sevenscenes import frame_paths, read_pose, read_split
 from synfeal.errors import InputError
 from synfeal.geometry.rotations import rotation_from_rpy
-from synfeal.validation.listing import list_sequences
 from synfeal.validation.manifest import check_manifest
 from tests import ROOT
 from tests.support.collected import collect, refused, tree_of

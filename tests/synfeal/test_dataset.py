@@ -21,6 +21,7 @@ from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.dataset.preview import write_contact_sheet
 from synfeal.dataset.render_sequence import MOST_WAITING, render_sequence, write_sequence
+from synfeal.dataset.sequence_listing import list_sequences
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_matrix, quat_wxyz_of
 from synfeal.geometry.rotations import rotation_from_rpy
@@ -29,7 +30,6 @@ from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.records.files import atomic_directory
 from synfeal.render.surface import Layers
-from synfeal.validation.listing import list_sequences
 from synfeal.validation.manifest import check_manifest
 from tests.support.collected import painted
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from synfeal.cli import main
-from synfeal.validation.depth_agreement import PosedDepth, compare_depth
+from synfeal.dataset.depth_agreement import PosedDepth, compare_depth
 from tests.support import box_depth
 from tests.support.box_depth import CAMERA, depth_m, world_from_cams, write_sequence
 
