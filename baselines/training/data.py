@@ -171,12 +171,28 @@ class BatchOrder:
     """Batches of frame indices: one epoch after another, cut without regard to epochs.
 
     Every batch is full, also when the set is smaller than a batch, so batch statistics stay stable.
+    Epochs are drawn on the processor, in one order for every device, and copied to it whole: a GPU
+    is not waited for at every step.
+
+    Args:
+        n_frames: Frames of an epoch.
+        batch_size: Frames of a batch.
+        seed: Seed of the order.
+        shuffled: Draw a new order for every epoch.
+        device: Device of the batches.
     """
 
-    def __init__(self, n_frames: int, batch_size: int, seed: int, shuffled: bool = True) -> None:
+    def __init__(
+        self,
+        n_frames: int,
+        batch_size: int,
+        seed: int,
+        shuffled: bool = True,
+        device: torch.device | str = "cpu",
+    ) -> None:
         self._n_frames, self._batch_size, self._shuffled = n_frames, batch_size, shuffled
         self._generator = torch.Generator().manual_seed(seed)
-        self._pending = torch.empty(0, dtype=torch.long)
+        self._pending = torch.empty(0, dtype=torch.long, device=device)
 
     def next_batch(self) -> Tensor:
         """Return the indices (batch_size,) of the next batch."""
@@ -184,19 +200,20 @@ class BatchOrder:
             epoch = torch.arange(self._n_frames)
             if self._shuffled:
                 epoch = torch.randperm(self._n_frames, generator=self._generator)
-            self._pending = torch.cat([self._pending, epoch])
+            self._pending = torch.cat([self._pending, epoch.to(self._pending.device)])
         batch = self._pending[: self._batch_size]
         self._pending = self._pending[self._batch_size :]
         return batch
 
     def state_dict(self) -> dict[str, Any]:
         """Return the state of the order."""
-        return {"generator": self._generator.get_state(), "pending": self._pending.clone()}
+        pending = self._pending.cpu().clone()
+        return {"generator": self._generator.get_state(), "pending": pending}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go on where another order stood."""
         self._generator.set_state(state["generator"])
-        self._pending = state["pending"]
+        self._pending = state["pending"].to(self._pending.device)
 
 
 def held_out_paths(path: NDArray[np.int64], share: float, seed: int) -> NDArray[np.bool_]:

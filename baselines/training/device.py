@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Literal
 
 import torch
@@ -48,3 +50,19 @@ def precision_on(device: torch.device, wanted: Literal["auto", "float32", "bfloa
 def autocast(device: torch.device, precision: Precision) -> torch.autocast:
     """Return a context in which networks compute in this precision; weights stay in float32."""
     return torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16")
+
+
+@contextmanager
+def tensor_float32(device: torch.device) -> Iterator[None]:
+    """Let a GPU round the factors of float32 matrix products to ten bits, which is faster.
+
+    On a processor nothing changes.
+    """
+    before = torch.get_float32_matmul_precision()
+    if device.type == "cuda":
+        torch.set_float32_matmul_precision("high")
+    try:
+        yield
+    finally:
+        if device.type == "cuda":
+            torch.set_float32_matmul_precision(before)

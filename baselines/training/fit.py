@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple
-from typing import Protocol as Interface
 
 import torch
-from torch import Tensor
 
 from baselines.localizers.base import Localizer
 from baselines.training.averaging import WeightAverage
 from baselines.training.data import BatchOrder, ImageStatistics, LabelledFrames
-from baselines.training.device import Precision, autocast
+from baselines.training.device import Precision
 from baselines.training.optimizer import Optimisation, OptimiserName, Schedule, optimisation_of
 from baselines.training.resume import RandomState, Restorable, ResumeFile, stop_signals
 from baselines.training.selection import HistoryRow, Selection, SelectionKind, TrainingProgress
+from baselines.training.step import (
+    Augmentation,
+    PlainStep,
+    Randomisation,
+    TrainingStep,
+    training_step,
+)
 
 
 class Protocol(NamedTuple):
@@ -56,20 +62,6 @@ PHOTOGRAPHS = PROTOCOLS["corrected"]._replace(selection="averaged")
 
 LAST_WEIGHTS = PROTOCOLS["corrected"]._replace(selection="last")
 NOT_KEPT = ResumeFile(None, "")
-
-
-class Randomisation(Restorable, Interface):
-    """Changes how images look before they are normalised; its state is its generator's."""
-
-    def __call__(self, images: Tensor, /) -> Tensor:
-        """Randomise images (B, 3, H, W) uint8 to float grey levels (B, 3, H, W)."""
-
-
-class Augmentation(Restorable, Interface):
-    """Changes training images and the labels with them; its state is where its generator stands."""
-
-    def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
-        """Augment images (B, 3, H, W), normalised, and their unit quaternions (B, 4)."""
 
 
 @dataclass
@@ -122,21 +114,25 @@ class Fitting:
         }
         return parts | {name: part for name, part in further.items() if part is not None}
 
+    @cached_property
+    def take_step(self) -> TrainingStep:
+        """What learns from one batch, as the device does it best."""
+        return training_step(
+            PlainStep(
+                self.localizer,
+                self.frames,
+                self.statistics,
+                self.optimisation,
+                self.precision,
+                self.randomise,
+                self.augment,
+            )
+        )
+
     def step(self) -> None:
         """Learn from the next batch, and look how good the weights are where that is due."""
-        device = self.frames.images.device
-        images, position_m, quat_wxyz = self.frames.batch(self.order.next_batch().to(device))
-        if self.randomise is not None:
-            images = self.randomise(images)
-        normalised = self.statistics.normalise(images)
-        if self.augment is not None:
-            normalised, quat_wxyz = self.augment(normalised, quat_wxyz)
-        with autocast(device, self.precision):
-            predictions = self.localizer(normalised)
-        loss = self.localizer.loss(predictions, position_m, quat_wxyz)
         rate = self.optimisation.learning_rate
-        self.optimisation.step(loss)
-        self.progress.add(loss)
+        self.progress.add(self.take_step(self.order.next_batch()))
         if self.average is not None:
             self.average.after(self.progress.done)
         due = self.progress.done in self.evaluations
@@ -183,7 +179,9 @@ def fit(
         frames,
         statistics,
         optimisation_of(protocol.optimiser, localizer, schedule),
-        BatchOrder(len(frames), schedule.batch_size, seed, protocol.order == "shuffled"),
+        BatchOrder(
+            len(frames), schedule.batch_size, seed, protocol.order == "shuffled", frames.rows.device
+        ),
         TrainingProgress(schedule.steps, schedule.batch_size, frames.images.device),
         selection,
         selection.due_after(schedule.steps, schedule.samples_seen),

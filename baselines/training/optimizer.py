@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import torch
 from torch import Tensor, nn
-from torch.optim.lr_scheduler import LambdaLR, LRScheduler, StepLR
 
 from baselines.localizers.base import OutputLayer
+from baselines.training.device import tensor_float32
 from baselines.training.polar import inverse_square_root, quintics_for
 from baselines.training.untraced import Adam, AdamW, Untraced
 
@@ -40,6 +40,8 @@ class Muon(Untraced):
     are iterated upon together (:mod:`baselines.training.polar`): a narrow network has many small
     kernels. A step has the size ``lr * sqrt(max(1, out / in))``, whatever the gradient's; weight
     decay is decoupled.
+
+    A rate that is a tensor is read on its device, so that a step can be captured in a CUDA graph.
     """
 
     def __init__(
@@ -119,8 +121,10 @@ class _Stack:
             _member(position, parameters[position], gram)
             for position, gram in zip(positions, self._grams, strict=True)
         ]
+        longer = self._grams.new_tensor([member.longer for member in self._members])
+        self._longer = longer[:, None, None]
 
-    def step(self, ahead: Sequence[Tensor], rate: float, weight_decay: float) -> None:
+    def step(self, ahead: Sequence[Tensor], rate: float | Tensor, weight_decay: float) -> None:
         """Move every parameter of the stack along the orthogonal factor of its step.
 
         Args:
@@ -129,16 +133,43 @@ class _Stack:
             weight_decay: Share of a weight that decays per unit of ``rate``.
         """
         steps = [self._as_matrix(ahead[member.position], member) for member in self._members]
-        for member, step in zip(self._members, steps, strict=True):
-            left, right = (step.mT, step) if member.upright else (step, step.mT)
-            torch.mm(left, right, out=member.gram)
+        # Rounded to ten bits, the factors of these products change a step by 0.04 % (1.2 % where
+        # the gradient's singular values span four decades). The iterations between would lose the
+        # small singular values (results/benchmarks/muon_precision.csv).
+        with tensor_float32(self._grams.device):
+            for member, step in zip(self._members, steps, strict=True):
+                left, right = (step.mT, step) if member.upright else (step, step.mT)
+                torch.mm(left, right, out=member.gram)
         roots = inverse_square_root(self._grams, quintics_for(LOWEST, ITERATIONS))
+        with tensor_float32(self._grams.device):
+            if isinstance(rate, Tensor):
+                self._move_by(steps, roots, rate, weight_decay)
+            else:
+                self._move(steps, roots, rate, weight_decay)
+
+    def _move(self, steps: list[Tensor], roots: Tensor, rate: float, weight_decay: float) -> None:
+        """Let every parameter decay, and take ``rate`` times its orthogonal step off it."""
         kept = 1 - rate * weight_decay
+        for member, left, right in self._factors(steps, roots):
+            member.matrix.addmm_(left, right, beta=kept, alpha=-rate * member.longer)
+
+    def _move_by(
+        self, steps: list[Tensor], roots: Tensor, rate: Tensor, weight_decay: float
+    ) -> None:
+        """Do the same by a rate on the device, which BLAS does not take as a factor."""
+        torch._foreach_mul_([m.matrix for m in self._members], 1 - rate * weight_decay)
+        for member, left, right in self._factors(steps, roots * (rate * self._longer)):
+            member.matrix.addmm_(left, right, alpha=-1)
+
+    def _factors(
+        self, steps: list[Tensor], roots: Tensor
+    ) -> Iterator[tuple[_Member, Tensor, Tensor]]:
+        """Yield each member with the two factors of its orthogonal step."""
         for member, step, root in zip(self._members, steps, roots, strict=True):
             shorter = len(member.gram)
             inner = root[:shorter, :shorter]
             left, right = (step, inner) if member.upright else (inner, step)
-            member.matrix.addmm_(left, right, beta=kept, alpha=-rate * member.longer)
+            yield member, left, right
 
     @staticmethod
     def _as_matrix(step: Tensor, member: _Member) -> Tensor:
@@ -177,6 +208,8 @@ OptimiserName = Literal["muon", "adamw", "halving"]
 # Muon's rate over that of the rest: a step of it is as long as the rate says, whatever the gradient
 MUON_RATE = 20.0
 WARM_UP = 0.05
+# Factor on an optimiser's rates after so many steps of a run.
+RateFactor = Callable[[int], float]
 
 
 class Schedule(NamedTuple):
@@ -203,40 +236,76 @@ class Schedule(NamedTuple):
 
 
 class Optimisation:
-    """Optimisers with the schedules of their rates, which step together once per batch."""
+    """Optimisers that step together once per batch, by rates that follow the steps taken.
 
-    def __init__(self, *pairs: tuple[torch.optim.Optimizer, LRScheduler]) -> None:
-        self._optimizers = [optimizer for optimizer, _ in pairs]
-        self._schedulers = [scheduler for _, scheduler in pairs]
+    Rates of parameters on a GPU are tensors there: a captured step reads them anew every time.
+
+    Args:
+        parts: Optimisers, each with its factor on the rates that it was made with.
+    """
+
+    def __init__(self, *parts: tuple[torch.optim.Optimizer, RateFactor]) -> None:
+        self._parts = parts
+        self._done = 0
+        for optimizer, _ in parts:
+            for group in optimizer.param_groups:
+                group["initial_lr"] = group["lr"]
+        self._place_rates()
 
     @property
     def learning_rate(self) -> float:
         """Rate of the next step, that of biases where there are several."""
-        return float(self._schedulers[-1].get_last_lr()[-1])
+        optimizer, factor = self._parts[-1]
+        return float(optimizer.param_groups[-1]["initial_lr"] * factor(self._done))
 
     def step(self, loss: Tensor) -> None:
-        """Take one step down the gradient of ``loss``."""
-        for optimizer in self._optimizers:
+        """Take one step down the gradient of ``loss``, and set the rates of the next one."""
+        self.descend(loss)
+        self.advance()
+
+    def descend(self, loss: Tensor) -> None:
+        """Take one step down the gradient of ``loss``; what it needs is on its device."""
+        for optimizer, _ in self._parts:
             optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
-        for optimizer in self._optimizers:
+        for optimizer, _ in self._parts:
             optimizer.step()
-        for scheduler in self._schedulers:
-            scheduler.step()
+
+    def advance(self) -> None:
+        """Count a step, and set the rates of the next one."""
+        self._done += 1
+        for group, rate in self._rates():
+            if isinstance(group["lr"], Tensor):
+                group["lr"].fill_(rate)
+            else:
+                group["lr"] = rate
+
+    def _rates(self) -> Iterator[tuple[dict[str, Any], float]]:
+        """Yield each group of parameters with the rate of the next step."""
+        for optimizer, factor in self._parts:
+            for group in optimizer.param_groups:
+                yield group, group["initial_lr"] * factor(self._done)
+
+    def _place_rates(self) -> None:
+        """Put the rates where the parameters are."""
+        for group, rate in self._rates():
+            device = next((p.device for p in group["params"]), torch.device("cpu"))
+            on_processor = device.type == "cpu"
+            group["lr"] = rate if on_processor else torch.tensor(rate, device=device)
 
     def state_dict(self) -> dict[str, Any]:
         """Return the state of every part."""
         return {
-            "optimizers": [optimizer.state_dict() for optimizer in self._optimizers],
-            "schedulers": [scheduler.state_dict() for scheduler in self._schedulers],
+            "optimizers": [optimizer.state_dict() for optimizer, _ in self._parts],
+            "done": self._done,
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Go on where another optimisation stood."""
-        for optimizer, before in zip(self._optimizers, state["optimizers"], strict=True):
+        for (optimizer, _), before in zip(self._parts, state["optimizers"], strict=True):
             optimizer.load_state_dict(before)
-        for scheduler, before in zip(self._schedulers, state["schedulers"], strict=True):
-            scheduler.load_state_dict(before)
+        self._done = state["done"]
+        self._place_rates()
 
 
 def optimisation_of(kind: OptimiserName, network: nn.Module, schedule: Schedule) -> Optimisation:
@@ -266,16 +335,21 @@ def _muon(network: nn.Module, schedule: Schedule) -> Optimisation:
     rest = [p for p in network.parameters() if id(p) not in taken]
     rate = schedule.learning_rate
     muon = Muon(hidden, MUON_RATE * rate, weight_decay=schedule.weight_decay)
-    return Optimisation((muon, _rise_and_fall(muon, schedule)), _adamw_pair(rest, schedule))
+    return Optimisation((muon, _rise_and_fall(schedule)), _adamw_pair(rest, schedule))
 
 
 def _halving(network: nn.Module, schedule: Schedule) -> Optimisation:
     """Set up Adam with weight decay on all parameters and a rate that halves at equal intervals."""
+    parameters = [*network.parameters()]
     optimizer = Adam(
-        network.parameters(), schedule.learning_rate, weight_decay=schedule.weight_decay, fused=True
+        parameters,
+        schedule.learning_rate,
+        weight_decay=schedule.weight_decay,
+        fused=True,
+        capturable=parameters[0].is_cuda,
     )
-    step = max(1, round(schedule.halve_every * schedule.steps))
-    return Optimisation((optimizer, StepLR(optimizer, step, gamma=0.5)))
+    interval = max(1, round(schedule.halve_every * schedule.steps))
+    return Optimisation((optimizer, lambda done: 0.5 ** (done // interval)))
 
 
 OPTIMISERS: dict[OptimiserName, Callable[[nn.Module, Schedule], Optimisation]] = {
@@ -288,21 +362,26 @@ OPTIMISERS: dict[OptimiserName, Callable[[nn.Module, Schedule], Optimisation]] =
 
 def _adamw_pair(
     parameters: list[nn.Parameter], schedule: Schedule
-) -> tuple[torch.optim.Optimizer, LRScheduler]:
+) -> tuple[torch.optim.Optimizer, RateFactor]:
     """Set up AdamW that decays weights, but not biases, batch normalisation and loss weights."""
     groups = [
         {"params": [p for p in parameters if p.ndim > 1], "weight_decay": schedule.weight_decay},
         {"params": [p for p in parameters if p.ndim <= 1], "weight_decay": 0.0},
     ]
-    # A shorter memory of squared gradients than the default: it must fit into a few hundred steps.
-    optimizer = AdamW(groups, schedule.learning_rate, betas=(0.9, 0.99), fused=True)
-    return optimizer, _rise_and_fall(optimizer, schedule)
+    optimizer = AdamW(
+        groups,
+        schedule.learning_rate,
+        # A shorter memory of squared gradients than the default: it must fit into a few hundred
+        # steps.
+        betas=(0.9, 0.99),
+        fused=True,
+        capturable=parameters[0].is_cuda,
+    )
+    return optimizer, _rise_and_fall(schedule)
 
 
-def _rise_and_fall(optimizer: torch.optim.Optimizer, schedule: Schedule) -> LRScheduler:
+def _rise_and_fall(schedule: Schedule) -> RateFactor:
     """Raise the rate linearly within ``WARM_UP`` of the run, then lower it linearly to 0."""
     steps = schedule.steps
     rise = max(1.0, WARM_UP * steps)
-    return LambdaLR(
-        optimizer, lambda done: min((done + 1) / rise, (steps - done) / max(steps - rise, 1.0), 1.0)
-    )
+    return lambda done: min((done + 1) / rise, (steps - done) / max(steps - rise, 1.0), 1.0)

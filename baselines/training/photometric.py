@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from typing import NamedTuple
 
 import torch
@@ -40,16 +41,25 @@ class Rectangles(NamedTuple):
 class PhotometricRandomisation:
     """Shows every image of a batch under its own random light, lens and sensor.
 
-    Draws are made on the processor, so that one seed gives one training run wherever it runs.
+    Draws are made on the device of the images: for noise alone there are as many as pixels, more
+    than a processor makes in the time in which a GPU learns from them.
 
     Args:
         config: Ranges to draw from.
-        seed: Seed of all draws.
+        seed: Seed of all draws. It gives one row of them on every processor, and another on every
+            GPU.
+        device: Device of the images.
+
+    Attributes:
+        generator: Generator of all draws.
     """
 
-    def __init__(self, config: PhotometricConfig, seed: int) -> None:
+    def __init__(
+        self, config: PhotometricConfig, seed: int, device: torch.device | str = "cpu"
+    ) -> None:
         self._config = config
-        self._generator = torch.Generator().manual_seed(seed)
+        self._device = torch.device(device)
+        self.generator = torch.Generator(device).manual_seed(seed)
 
     def __call__(self, images: Tensor) -> Tensor:
         """Randomise images (B, 3, S, S) uint8 to float grey levels in 0 to 255, channels last."""
@@ -60,37 +70,37 @@ class PhotometricRandomisation:
         light = light_of(images)
         if config.field_ev:
             nodes_ev = config.field_ev * self._normal(count, 1, config.field_cells)
-            light = light * smooth_gain(nodes_ev, side).to(light)
+            light = light * smooth_gain(nodes_ev, side)
         if config.occlusion is not None:
             light = covered(light, self._rectangles(config.occlusion, count, side))
         if config.blur is not None:
             sigma_px = config.blur.sigma * side * self._uniform(count, 2)
-            hit = torch.nonzero(self._uniform(count) < config.blur.share).squeeze(1)
-            light[hit.to(light.device)] = blurred(light[hit.to(light.device)], sigma_px[hit])
+            light = blurred_where(self._uniform(count) < config.blur.share, light, sigma_px)
         low_ev, high_ev = config.exposure_ev
         gain = torch.exp2(low_ev + (high_ev - low_ev) * self._uniform(count, 1, 1, 1))
         low, high = config.offset
         offset = low + (high - low) * self._uniform(count, 1, 1, 1)
-        light = (light * gain.to(light) + offset.to(light)).clamp_(0.0, 1.0)
+        light = (light * gain + offset).clamp_(0.0, 1.0)
         if config.noise is not None:
-            light = noisy(light, self._normal(count, 3, side).to(light), config.noise)
+            light = noisy(light, self._normal(count, 3, side), config.noise)
         balance_ev = config.white_balance_ev * (2 * self._uniform(count, 2) - 1)
-        light = light * balance_gains(balance_ev).to(light)
+        light = light * balance_gains(balance_ev)
         return levels_of(light).contiguous(memory_format=torch.channels_last)
 
     def state_dict(self) -> dict[str, Tensor]:
         """Return the state of the generator."""
-        return {"generator": self._generator.get_state()}
+        return {"generator": self.generator.get_state()}
 
     def load_state_dict(self, state: Mapping[str, Tensor], /) -> None:
         """Restore the generator."""
-        self._generator.set_state(state["generator"])
+        self.generator.set_state(state["generator"])
 
     def _uniform(self, *shape: int) -> Tensor:
-        return torch.rand(*shape, generator=self._generator)
+        return torch.rand(*shape, generator=self.generator, device=self._device)
 
     def _normal(self, count: int, channels: int, side: int) -> Tensor:
-        return torch.randn(count, channels, side, side, generator=self._generator)
+        shape = (count, channels, side, side)
+        return torch.randn(*shape, generator=self.generator, device=self._device)
 
     def _rectangles(self, config: OcclusionConfig, count: int, side: int) -> Rectangles:
         """Draw rectangles of uniform area and place, their aspect ratio uniform in logarithm."""
@@ -121,7 +131,7 @@ def filled(images: Tensor, level: int, colors: Tensor) -> Tensor:
     empty = (images.amax(1, keepdim=True) <= level).float()
     empty = nn.functional.max_pool2d(empty, 3, stride=1, padding=1) > 0
     fill = nn.functional.interpolate(
-        255 * colors.to(images.device), images.shape[2:], mode="bilinear", align_corners=True
+        255 * colors, images.shape[2:], mode="bilinear", align_corners=True
     )
     return torch.where(empty, fill.round().byte(), images)
 
@@ -153,13 +163,26 @@ def smooth_gain(nodes_ev: Tensor, side: int) -> Tensor:
 
 def covered(light: Tensor, rectangles: Rectangles) -> Tensor:
     """Cover light (B, 3, H, W) with a rectangle of one colour per image."""
-    left, top, width, height = (values.to(light.device)[:, None] for values in rectangles[:4])
+    left, top, width, height = (values[:, None] for values in rectangles[:4])
     column = torch.arange(light.shape[3], device=light.device)
     row = torch.arange(light.shape[2], device=light.device)
     across = (column >= left) & (column < left + width)
     down = (row >= top) & (row < top + height)
     hidden = (down[:, :, None] & across[:, None, :])[:, None]
-    return torch.where(hidden, rectangles.light.to(light)[:, :, None, None], light)
+    return torch.where(hidden, rectangles.light[:, :, None, None], light)
+
+
+def blurred_where(hit: Tensor, light: Tensor, sigma_px: Tensor) -> Tensor:
+    """Blur those of the images (B, 3, S, S) that are hit (B,), as :func:`blurred` does.
+
+    A processor leaves the others out. On a GPU all are blurred and some results not used: how many
+    are hit would have to be waited for, and differs from batch to batch.
+    """
+    if light.device.type != "cpu":
+        return torch.where(hit[:, None, None, None], blurred(light, sigma_px), light)
+    rows = torch.nonzero(hit).squeeze(1)
+    light[rows] = blurred(light[rows], sigma_px[rows])
+    return light
 
 
 def blurred(light: Tensor, sigma_px: Tensor) -> Tensor:
@@ -169,25 +192,26 @@ def blurred(light: Tensor, sigma_px: Tensor) -> Tensor:
     filter, which is ``exp(-sigma^2 omega^2 / 2)`` on its coefficients: the mean stays as it is,
     and two blurs are one of the summed variances.
     """
-    across, down = (_mirrored_gaussian(light.shape[-1], sigma.to(light)) for sigma in sigma_px.T)
+    across, down = (_mirrored_gaussian(light.shape[-1], sigma) for sigma in sigma_px.T)
     return down[:, None] @ light @ across[:, None]
 
 
 def _mirrored_gaussian(side: int, sigma_px: Tensor) -> Tensor:
     """Return symmetric matrices (B, side, side) that filter a row or a column."""
-    cosines = _cosine_transform(side).to(sigma_px)
-    omega = torch.arange(side).to(sigma_px) * (math.pi / side)
+    cosines = _cosine_transform(side, sigma_px.device)
+    omega = torch.arange(side, device=sigma_px.device).to(sigma_px) * (math.pi / side)
     damping = torch.exp(-0.5 * (sigma_px[:, None] * omega) ** 2)
     return cosines.T @ (damping[:, :, None] * cosines)
 
 
-def _cosine_transform(side: int) -> Tensor:
-    """Return the orthogonal DCT-II (side, side): a row for each frequency."""
+@cache
+def _cosine_transform(side: int, device: torch.device) -> Tensor:
+    """Return the orthogonal DCT-II (side, side), a row for each frequency, on a device."""
     frequency = torch.arange(side, dtype=torch.float64)[:, None]
     place = torch.arange(side, dtype=torch.float64)[None] + 0.5
     rows = torch.cos(math.pi / side * frequency * place) * math.sqrt(2 / side)
     rows[0] /= math.sqrt(2)
-    return rows.float()
+    return rows.float().to(device)
 
 
 def noisy(light: Tensor, normal: Tensor, noise: NoiseConfig) -> Tensor:

@@ -162,7 +162,7 @@ def _train_on_rooms(
         seed=seed,
         protocol=LAST_WEIGHTS._replace(optimiser="adamw"),
         precision=precision_on(device, "auto"),
-        augment=random_rotation(rooms[0][0], network, pretraining.augmentation, seed),
+        augment=random_rotation(rooms[0][0], network, pretraining.augmentation, seed, device),
         resume=resume,
     )
     resume.remove()

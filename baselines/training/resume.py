@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 RESUME_EVERY_S = 60.0
 # Raised when a step is computed otherwise: a run must not begin with one kind and end with another.
-STEP_VERSION = 2
+STEP_VERSION = 3
 DIGEST_BYTES = 32
 # Handlers that stay: whoever ignores a signal wants it ignored.
 UNTOUCHED = (signal.SIG_IGN, None)

@@ -31,22 +31,37 @@ class RandomRotation:
 
     Rotation vectors are uniform in a box: up to ``tilt_deg`` about the camera's x and y axes, up to
     ``roll_deg`` about its optical axis. What the frame did not see is filled with its border.
+
+    Args:
+        intrinsics: Camera of the images, pixels.
+        input_px: Side of the images.
+        augmentation: Largest rotations.
+        seed: Seed of the rotations.
+        device: Device of the images, on which rotations are drawn: a seed gives one row of them on
+            every processor, and another on every GPU.
+
+    Attributes:
+        generator: Generator of the rotations.
     """
 
     def __init__(
-        self, intrinsics: Intrinsics, input_px: int, augmentation: AugmentationConfig, seed: int
+        self,
+        intrinsics: Intrinsics,
+        input_px: int,
+        augmentation: AugmentationConfig,
+        seed: int,
+        device: torch.device | str = "cpu",
     ) -> None:
         tilt, roll = math.radians(augmentation.tilt_deg), math.radians(augmentation.roll_deg)
-        self._largest_rad = torch.tensor([tilt, tilt, roll])
-        # Drawn on the processor, so that one seed gives one training run wherever it runs.
-        self._generator = torch.Generator().manual_seed(seed)
-        self._rays = _rays(intrinsics, input_px)
-        self._grid_from_ray = _grid_from_ray(intrinsics, input_px)
+        self._largest_rad = torch.tensor([tilt, tilt, roll], device=device)
+        self.generator = torch.Generator(device).manual_seed(seed)
+        self._rays = _rays(intrinsics, input_px).to(device)
+        self._grid_from_ray = _grid_from_ray(intrinsics, input_px).to(device)
 
     def __call__(self, images: Tensor, quat_wxyz: Tensor) -> tuple[Tensor, Tensor]:
         """Rotate images (B, 3, S, S), channels last, and their quaternions (B, 4)."""
-        draws = torch.rand(len(images), 3, generator=self._generator)
-        rotvec_rad = ((2 * draws - 1) * self._largest_rad).to(images.device)
+        draws = torch.rand(len(images), 3, generator=self.generator, device=images.device)
+        rotvec_rad = (2 * draws - 1) * self._largest_rad
         return self.rotated(images, rotvec_rad), quat_product(quat_wxyz, quat_of(rotvec_rad))
 
     def rotated(self, images: Tensor, old_from_new_rad: Tensor) -> Tensor:
@@ -55,8 +70,6 @@ class RandomRotation:
         A positive turn about y looks further right, one about x further up, one about z rolls the
         camera clockwise.
         """
-        device = images.device
-        self._rays, self._grid_from_ray = self._rays.to(device), self._grid_from_ray.to(device)
         points = self._grid_from_ray @ rotation_of(old_from_new_rad) @ self._rays
         across, down = points[:, :2].div_(points[:, 2:].clamp_min(LEAST_DEPTH)).unbind(1)
         grid = torch.stack([across, down], dim=-1).view(len(images), *images.shape[2:], 2)
@@ -67,15 +80,19 @@ class RandomRotation:
 
     def state_dict(self) -> dict[str, Tensor]:
         """Return the state of the generator."""
-        return {"generator": self._generator.get_state()}
+        return {"generator": self.generator.get_state()}
 
     def load_state_dict(self, state: Mapping[str, Tensor], /) -> None:
         """Restore the generator."""
-        self._generator.set_state(state["generator"])
+        self.generator.set_state(state["generator"])
 
 
 def random_rotation(
-    frames: Path, network: NetworkConfig, augmentation: AugmentationConfig, seed: int
+    frames: Path,
+    network: NetworkConfig,
+    augmentation: AugmentationConfig,
+    seed: int,
+    device: torch.device | str = "cpu",
 ) -> RandomRotation | None:
     """Set up random rotations of packed frames.
 
@@ -84,6 +101,7 @@ def random_rotation(
         network: Side and view of the network's input.
         augmentation: Largest rotations.
         seed: Seed of the rotations.
+        device: Device of the images.
 
     Returns:
         The rotations; None where nothing is to be rotated.
@@ -100,7 +118,8 @@ def random_rotation(
             f"{frames.with_suffix('.json')}: {reason}; images can only be rotated through a known "
             "pinhole camera, so set training.augmentation to 0"
         )
-    return RandomRotation(packed_intrinsics(camera, network), network.input_px, augmentation, seed)
+    intrinsics = packed_intrinsics(camera, network)
+    return RandomRotation(intrinsics, network.input_px, augmentation, seed, device)
 
 
 def packed_intrinsics(camera: FrameCamera, network: NetworkConfig) -> Intrinsics:
@@ -117,8 +136,25 @@ def rotation_of(rotvec_rad: Tensor) -> Tensor:
     x, y, z = rotvec_rad.unbind(1)
     o = torch.zeros_like(x)
     skew = torch.stack([o, -z, y, z, o, -x, -y, x, o], dim=1).view(-1, 3, 3)
+    if rotvec_rad.device.type != "cpu":
+        return _rodrigues(skew, rotvec_rad)
     matrices: Tensor = torch.linalg.matrix_exp(skew)
     return matrices
+
+
+def _rodrigues(skew: Tensor, rotvec_rad: Tensor) -> Tensor:
+    """Compute the exponentials (B, 3, 3) of skew matrices (B, 3, 3) in closed form.
+
+    Torch's ``matrix_exp`` copies from the processor to a GPU, which a CUDA graph does not allow.
+    """
+    angle_rad = torch.linalg.vector_norm(rotvec_rad, dim=1)[:, None, None]
+    # sin(a) / a and (1 - cos(a)) / a^2 as sinc, which is 1 at 0; torch's has pi in its argument.
+    sine = torch.sinc(angle_rad / math.pi)
+    cosine = 0.5 * torch.sinc(angle_rad / (2 * math.pi)) ** 2
+    identity = torch.eye(3, dtype=skew.dtype, device=skew.device)
+    # Sums of three, not matrix products, which a GPU may be allowed to round.
+    squared = (skew[:, :, :, None] * skew[:, None, :, :]).sum(2)
+    return identity + sine * skew + cosine * squared
 
 
 def quat_of(rotvec_rad: Tensor) -> Tensor:

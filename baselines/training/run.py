@@ -40,7 +40,6 @@ from baselines.training.device import open_device, precision_on
 from baselines.training.fit import (
     NOT_KEPT,
     PROTOCOLS,
-    Augmentation,
     Protocol,
     fit,
 )
@@ -49,8 +48,9 @@ from baselines.training.photometric import PhotometricRandomisation
 from baselines.training.predict import Predictions, write_predictions
 from baselines.training.record import write_training_record
 from baselines.training.resume import ResumeFile, digest
-from baselines.training.rotation import random_rotation
+from baselines.training.rotation import RandomRotation, random_rotation
 from baselines.training.selection import HistoryRow, write_history
+from baselines.training.step import Augmentation
 from baselines.training.typicality import calibrate
 
 log = logging.getLogger(__name__)
@@ -111,6 +111,11 @@ class Material(NamedTuple):
     statistics: ImageStatistics
     learned: LabelledFrames
     held_out: LabelledFrames | None
+
+    @property
+    def device(self) -> torch.device:
+        """Device that the run is on."""
+        return self.learned.images.device
 
     def fingerprints(self) -> list[object]:
         """List everything a run depends on beside its settings; of its images, samples."""
@@ -178,7 +183,7 @@ def train_localizer(
     """
     material = _material(job, frames, labels, weights, test)
     if augment is None and job.protocol.images == "rotated":
-        augment = random_rotation(frames, job.network, job.training.augmentation, job.seed)
+        augment = _rotation(job, frames, material.device)
     identity = digest(*job, augment and augment.state_dict(), *material.fingerprints())
     resume = ResumeFile(out_model.with_name("resume.pt"), identity)
     rows = _fit(job, material, augment, resume)
@@ -196,7 +201,8 @@ def train_localizer(
     localizer, statistics, learned, held_out = material
     calibration = None
     if calibrated:
-        calibration = calibrate(localizer, statistics, learned, held_out, _randomisation(job))
+        randomise = _randomisation(job, material.device)
+        calibration = calibrate(localizer, statistics, learned, held_out, randomise)
     save_checkpoint(out_model, localizer, statistics, description, calibration)
     write_history(out_history, rows)
     resume.remove()
@@ -220,7 +226,7 @@ def step_seconds(job: Job, frames: Path, labels: Path, weights: Path | None) -> 
         Seconds, the mean of a few steps after two that are not timed.
     """
     material = _material(job, frames, labels, weights, test=None)._replace(held_out=None)
-    augment = random_rotation(frames, job.network, job.training.augmentation, job.seed)
+    augment = _rotation(job, frames, material.device)
     batch = job.training.batch_size
     _fit(job._replace(samples_seen=2 * batch), material, augment, NOT_KEPT)
     began = time.perf_counter()
@@ -280,17 +286,22 @@ def _fit(
         protocol=job.protocol,
         held_out=held_out,
         patience=job.training.patience,
-        precision=precision_on(learned.images.device, job.training.precision),
-        randomise=_randomisation(job),
+        precision=precision_on(material.device, job.training.precision),
+        randomise=_randomisation(job, material.device),
         augment=augment,
         resume=resume,
     )
 
 
-def _randomisation(job: Job) -> PhotometricRandomisation | None:
+def _randomisation(job: Job, device: torch.device) -> PhotometricRandomisation | None:
     """Make the randomisation of images, where one is configured."""
     config = job.training.randomisation
-    return None if config is None else PhotometricRandomisation(config, job.seed)
+    return None if config is None else PhotometricRandomisation(config, job.seed, device)
+
+
+def _rotation(job: Job, frames: Path, device: torch.device) -> RandomRotation | None:
+    """Make the rotations of images, where some are configured."""
+    return random_rotation(frames, job.network, job.training.augmentation, job.seed, device)
 
 
 def _split(

@@ -50,7 +50,8 @@ class VirtualViews:
         if turns is not None and camera is not None and pairs:
             network = description.network
             intrinsics = packed_intrinsics(camera, network)
-            self._turn = RandomRotation(intrinsics, network.input_px, turns, seed=0)
+            device = trained.device
+            self._turn = RandomRotation(intrinsics, network.input_px, turns, 0, device)
             self._rotvecs_rad = paired_rotations_rad(turns, pairs)
 
     @property

@@ -152,7 +152,7 @@ def test_rates_rise_then_fall_to_nothing_and_outputs_are_left_to_adamw():
 
     network = RoomsNetwork("googlenet", 0.125, 2)
     optimisation = optimisation_of("muon", network, Schedule(6400, 64, 0.3, 0.0))
-    muon, adamw = optimisation._optimizers
+    (muon, _), (adamw, _) = optimisation._parts
     in_muon = {id(p) for group in muon.param_groups for p in group["params"]}
     assert id(network.heads.poses.weight) not in in_muon
     assert id(network.feature[2].weight) in in_muon
