@@ -43,11 +43,11 @@ class PrecisionRow(NamedTuple):
     error: float
 
 
-class RoundedProducts(TorchDispatchMode):
+class RoundedProducts(TorchDispatchMode):  # type: ignore[no-untyped-call]
     """Rounds the factors of every matrix product to so many bits."""
 
     def __init__(self, bits: int) -> None:
-        super().__init__()
+        super().__init__()  # type: ignore[no-untyped-call]
         self._bits = bits
 
     def __torch_dispatch__(self, func, types, args=(), kwargs=None):  # type: ignore[no-untyped-def]
@@ -72,7 +72,8 @@ def gradient_of(rows: int, columns: int, decades: int) -> Tensor:
     if not decades:
         return drawn
     left, _, right = torch.linalg.svd(drawn, full_matrices=False)
-    return (left * torch.logspace(0, -decades, rows)) @ right
+    gradient: Tensor = (left * torch.logspace(0, -decades, rows)) @ right
+    return gradient
 
 
 def step_of(gradient: Tensor, around: int | None, within: int | None) -> Tensor:
