@@ -53,6 +53,11 @@ class LocalizerConfig(Strict):
     skip: Literal["sum", "concatenation"] = Field(
         "sum", description="Hourglass: how its decoder joins the encoder's maps"
     )
+    auxiliary: bool = Field(
+        True,
+        description="PoseNet, PoseLSTM, PoseNet2: two auxiliary regressors, as in the Synfeal"
+        " authors' code; in their papers PoseNet alone has them",
+    )
     beta: Positive | None = Field(None, description="weight of the orientation (beta losses)")
     s_position: Finite = Field(0.0, description="initial log-variance (learned losses)")
     s_orientation: Finite = Field(-3.0, description="initial log-variance (learned losses)")

@@ -10,8 +10,9 @@ r"""PoseLSTM.
 
 Differences from the paper: batch normalisation in the backbone; hidden states of 128 units per
 direction, as in the Synfeal authors' code, where PoseLSTM's own code has 256; q and -q count as the
-same rotation, except with ``protocol: published``. The Synfeal authors' code has two auxiliary
-regressors, with LSTMs, and reads the pooled maps of Inception v3 without the paper's layer before.
+same rotation, except with ``protocol: published``; two auxiliary regressors with LSTMs of their
+own, as in the Synfeal authors' code, which ``auxiliary: false`` leaves out. That code reads the
+pooled maps of Inception v3 without the paper's layer before.
 At a width below 1 the feature's two sides and the hidden states shrink with its square root.
 """
 
@@ -23,6 +24,7 @@ import torch
 from torch import Tensor, nn
 
 from baselines.config.learning import LocalizerConfig, NetworkConfig
+from baselines.localizers.auxiliary import AuxiliaryPair, auxiliary_layers
 from baselines.localizers.backbones import scaled_channels
 from baselines.localizers.backbones.weights import build_inception
 from baselines.localizers.base import Localizer, PoseRegressor, beta_loss
@@ -57,8 +59,8 @@ class FourDirectionLstm(nn.Module):
     halve_every=(150, 500),
     style={"color": "#0072B2", "marker": "s", "linestyle": "--"},
 )
-class PoseLstm(Localizer):
-    """An Inception network, its feature reduced by LSTMs in four directions, weight ``beta``."""
+class PoseLstm(AuxiliaryPair, Localizer):
+    """An Inception network, its features reduced by LSTMs in four directions, weight ``beta``."""
 
     def __init__(self, network: NetworkConfig, hyper: LocalizerConfig) -> None:
         super().__init__()
@@ -71,11 +73,24 @@ class PoseLstm(Localizer):
             nn.Linear(self.backbone.n_out, rows * columns),
             nn.ReLU(),
         )
-        self.lstm = FourDirectionLstm(rows, columns, scaled_channels(HIDDEN, side))
+        hidden = scaled_channels(HIDDEN, side)
+        self.lstm = FourDirectionLstm(rows, columns, hidden)
         self.regressor = nn.Sequential(nn.Dropout(hyper.dropout), PoseRegressor(self.lstm.n_out))
+        self.auxiliary1 = self.auxiliary2 = None
+        if hyper.auxiliary:
+            self.auxiliary1, self.auxiliary2 = (
+                nn.Sequential(
+                    *auxiliary_layers(n_in, rows * columns, network.width),
+                    FourDirectionLstm(rows, columns, hidden),
+                    nn.Dropout(hyper.dropout),
+                    PoseRegressor(4 * hidden),
+                )
+                for n_in in self.backbone.n_aux
+            )
         self.criterion = beta_loss(self.kind.name, hyper)
 
     def forward(self, images: Tensor) -> list[PosePrediction]:
-        """Predict poses of normalised images (B, 3, H, W): one prediction."""
-        features = self.feature(self.backbone(images).last)
-        return [self.regressor(self.lstm(features))]
+        """Predict poses: the main ones, then those of the first and second auxiliary regressor."""
+        maps = self.backbone(images)
+        main = self.regressor(self.lstm(self.feature(maps.last)))
+        return [main, *self.predict_on_the_way(maps)]

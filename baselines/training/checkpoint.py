@@ -182,7 +182,7 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
             " train it again"
         )
     try:
-        description = ModelDescription.model_validate(content["description"])
+        description = ModelDescription.model_validate(_with_auxiliary(content))
     except ValidationError as error:
         reason = describe(error)
         raise InputError(f"{path}: its description cannot be used ({reason})") from error
@@ -200,6 +200,21 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
             " train it again"
         ) from error
     return TrainedLocalizer(description, network.eval(), statistics, calibration)
+
+
+def _with_auxiliary(content: dict[str, Any]) -> Any:
+    """Return a description that says whether there are auxiliary regressors.
+
+    Those of version 0.1 do not: PoseNet alone had them then, so the weights tell.
+    """
+    described, weights = content["description"], content["localizer"]
+    if not isinstance(described, dict) or not isinstance(weights, dict):
+        return described
+    hyper = described.get("hyper")
+    if not isinstance(hyper, dict) or "auxiliary" in hyper:
+        return described
+    heads = any(str(name).startswith("auxiliary") for name in weights)
+    return {**described, "hyper": {**hyper, "auxiliary": heads}}
 
 
 def _read(path: Path, device: torch.device) -> dict[str, Any]:

@@ -52,6 +52,25 @@ def test_a_checkpoint_is_all_that_prediction_needs(name, network, hyper, tmp_pat
         assert (ours == theirs).all()
 
 
+@pytest.mark.parametrize(
+    ("name", "auxiliary"), [("posenet", True), ("poselstm", False), ("posenet2", False)]
+)
+def test_a_model_of_before_auxiliary_regressors_were_declared_is_what_it_was(
+    name, auxiliary, tmp_path
+):
+    """PoseNet alone had them, and descriptions did not say so."""
+    trained = untrained(name, NETWORK, HYPER.model_copy(update={"auxiliary": auxiliary}))
+    file = save(tmp_path / "model.pt", trained)
+    content = torch.load(file, weights_only=True)
+    del content["description"]["hyper"]["auxiliary"]
+    torch.save(content, file)
+    found = read_checkpoint(file, CPU)
+    assert found.description == trained.description
+    images = torch.randint(0, 256, (3, 3, 32, 32), dtype=torch.uint8)
+    for ours, theirs in zip(predict(found, images), predict(trained, images), strict=True):
+        assert (ours == theirs).all()
+
+
 UNKNOWN = {"localizer": "posenet2", "network": {"attention": True}}
 
 

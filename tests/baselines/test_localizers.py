@@ -24,7 +24,8 @@ NETWORK = NetworkConfig(input_px=32, width=0.125)
 HYPER = LocalizerConfig(learning_rate=3e-3, dropout=0.0, beta=1.0, s_orientation=-1.0)
 INCEPTION_V3 = NetworkConfig(backbone="inception_v3", input_px=75, width=0.125)
 CONCATENATION = HYPER.model_copy(update={"skip": "concatenation"})
-AUXILIARY = {"posenet": 2}
+WITHOUT = HYPER.model_copy(update={"auxiliary": False})
+HAVE_AUXILIARY = ("posenet", "poselstm", "posenet2")
 
 
 class Case(NamedTuple):
@@ -36,6 +37,10 @@ class Case(NamedTuple):
 
     def build(self):
         return build_localizer(*self)
+
+    @property
+    def n_predictions(self):
+        return 3 if self.name in HAVE_AUXILIARY and self.hyper.auxiliary else 1
 
     def batch(self, count=6):
         return batch(count, self.network.input_px)
@@ -49,6 +54,7 @@ CASES = {
     **{name: Case(name) for name in MODELS},
     **{f"{n}-inception_v3": Case(n, INCEPTION_V3) for n in MODELS if not LOCALIZERS[n].backbone},
     "hourglass-concatenation": Case("hourglass", hyper=CONCATENATION),
+    **{f"{name}-alone": Case(name, hyper=WITHOUT) for name in HAVE_AUXILIARY},
 }
 
 
@@ -78,7 +84,7 @@ def test_predictions_have_the_contracts_shapes_and_teach_every_parameter(case):
     images, position_m, quat_wxyz = case.batch()
     localizer = case.build()
     predictions = localizer(images)
-    assert len(predictions) == 1 + AUXILIARY.get(case.name, 0)
+    assert len(predictions) == case.n_predictions
     for prediction in predictions:
         assert prediction.position_m.shape == (6, 3)
         assert prediction.quat_wxyz.shape == (6, 4)
@@ -124,23 +130,38 @@ def test_the_pose_prior_moves_every_regressor(case):
     mean = torch.tensor([10.0, -20.0, 30.0])
     localizer.set_pose_prior(mean)
     biases = [m.position.bias for m in localizer.modules() if isinstance(m, PoseRegressor)]
-    assert len(biases) == 1 + AUXILIARY.get(case.name, 0)
+    assert len(biases) == case.n_predictions
     assert all(torch.equal(bias, mean) for bias in biases)
 
 
-def test_auxiliary_predictions_count_three_tenths():
-    localizer = build_localizer("posenet", NETWORK, HYPER)
+@pytest.mark.parametrize("name", HAVE_AUXILIARY)
+def test_auxiliary_predictions_count_three_tenths(name):
+    """Whatever the loss: learned weights that are 0 leave distances as they are."""
+    hyper = HYPER.model_copy(update={"s_position": 0.0, "s_orientation": 0.0})
+    localizer = build_localizer(name, NETWORK, hyper)
     position_m, quat_wxyz = torch.zeros(1, 3), torch.tensor([[1.0, 0.0, 0.0, 0.0]])
     off = [PosePrediction(torch.tensor([[d, 0.0, 0.0]]), quat_wxyz) for d in (1.0, 10.0, 100.0)]
     loss = localizer.loss(off, position_m, quat_wxyz)
     assert loss.item() == pytest.approx(1.0 + 0.3 * 10.0 + 0.3 * 100.0)
 
 
+@pytest.mark.parametrize("name", HAVE_AUXILIARY)
+def test_auxiliary_regressors_leave_the_rest_of_the_network_as_it_is(name):
+    """Same seed, same first weights: a comparison of runs with and without them is paired."""
+    parts = []
+    for hyper in (HYPER, WITHOUT):
+        torch.manual_seed(3)
+        parts.append(build_localizer(name, NETWORK, hyper).state_dict())
+    both, alone = parts
+    assert {key for key in both if not key.startswith("auxiliary")} == alone.keys()
+    assert all(torch.equal(both[key], value) for key, value in alone.items())
+
+
 @pytest.mark.parametrize(
     ("case", "prediction", "last", "next_one"),
     [
-        ("posenet", 1, "inception4a", "inception4b"),
-        ("posenet", 2, "inception4d", "inception4e"),
+        *[(name, 1, "inception4a", "inception4b") for name in HAVE_AUXILIARY],
+        *[(name, 2, "inception4d", "inception4e") for name in HAVE_AUXILIARY],
         ("posenet-inception_v3", 1, "Mixed_5d", "Mixed_6a"),
         ("posenet-inception_v3", 2, "Mixed_6e", "Mixed_7a"),
     ],
