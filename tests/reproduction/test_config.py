@@ -188,8 +188,8 @@ def test_controls_show_small_sets_as_many_images_and_large_ones_every_frame_twic
 
 
 def test_no_two_fresh_runs_share_a_seed():
-    # The last three are for no claim.
-    names = [*(run.profile for run in RUNS), "shapes", "maps", "sanctuary_labels"]
+    # Three are for no claim; replications have the seeds from 101 on.
+    names = [*(run.profile for run in RUNS), "shapes", "maps", "sanctuary_labels", "replication"]
     seeds = [load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml").seed for name in names]
     assert len({*seeds, 0}) == len(seeds) + 1
 
