@@ -32,7 +32,7 @@ from scipy.spatial.transform import Rotation
 from baselines.labels.alignment import fit
 from reproduction.real.labels import motion_of, of_depth_camera
 from synfeal.config.load import read_yaml
-from synfeal.evaluation.formats import read_estimates
+from synfeal.dataset.poses_in import read_pose_list
 from synfeal.geometry.poses import position_error_m
 from synfeal.records.tables import write_frame
 
@@ -48,7 +48,7 @@ def read_scene(folder: Path, scene: str) -> dict[str, Array]:
     """Read ``world_from_cam`` (4, 4) of all frames of a scene, by name."""
     found: dict[str, Array] = {}
     for split in ("train", "test"):
-        estimates = read_estimates(folder / f"{scene}_{split}.txt")
+        estimates = read_pose_list(folder / f"{scene}_{split}.txt")
         poses = estimates.world_from_cam(estimates.convention)
         found |= zip(estimates.names, poses, strict=True)
     return found

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from reproduction.real.split import blocks_of, full_name
 from reproduction.statistics.seeds import Group, Layout, limits
 from synfeal.dataset.pose_table import IMAGE, read_pose_table
+from synfeal.dataset.poses_in import read_pose_list
 from synfeal.errors import InputError
 from synfeal.evaluation.bootstrap import Counts, medians, path_counts
-from synfeal.evaluation.formats import read_estimates
 from synfeal.evaluation.metrics import means
 from synfeal.geometry.poses import pose_error
 from synfeal.records.provenance import generator_of
@@ -77,7 +77,7 @@ def read_errors(poses: Path, truth: Truth) -> Errors:
     Raises:
         InputError: The file cannot be read, or lacks a photograph.
     """
-    estimates = read_estimates(poses)
+    estimates = read_pose_list(poses)
     found = estimates.world_from_cam(estimates.convention)
     row = {photograph_name(name): i for i, name in enumerate(estimates.names)}
     lost = [name for name in truth.names if name not in row]

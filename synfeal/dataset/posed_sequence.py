@@ -30,10 +30,10 @@ from synfeal.dataset.frame_files import (
     sequence_at,
     sequence_names,
 )
-from synfeal.dataset.pose_table import UNIT_TOLERANCE
+from synfeal.dataset.poses_in import read_trajectory
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
-from synfeal.geometry.poses import interpolate, pose_from_quat
+from synfeal.geometry.poses import interpolate
 from synfeal.geometry.rigid import refuse_non_rigid
 from synfeal.records.files import lies_in
 
@@ -251,7 +251,10 @@ def _read_tum(path: Path) -> PosedFrames:
         nearest = np.abs(depth_s[None, :] - color_s[:, None]).argmin(axis=1)
         keep &= np.abs(depth_s[nearest] - color_s) <= DEPTH_SLACK_S
         depth = [files[index] for index in nearest]
-    pose_s, poses = _read_trajectory(path / TRAJECTORY)
+    trajectory = read_trajectory(path / TRAJECTORY).by_time()
+    if len(trajectory) < 2:
+        raise InputError(f"{path / TRAJECTORY}: holds one pose; a trajectory has two or more")
+    pose_s, poses = trajectory.stamps_s, trajectory.world_from_cam
     after = np.searchsorted(pose_s, color_s).clip(1, len(pose_s) - 1)
     gap_s = np.maximum(color_s - pose_s[after - 1], pose_s[after] - color_s)
     keep &= (gap_s <= POSE_SLACK_S) & (color_s >= pose_s[0]) & (color_s <= pose_s[-1])
@@ -305,26 +308,3 @@ def _read_list(path: Path, name: str) -> tuple[Array, list[Path]]:
     if not files:
         raise InputError(f"{path / name}: lists no images")
     return np.array(stamps), files
-
-
-def _read_trajectory(path: Path) -> tuple[Array, Array]:
-    """Read rising time stamps (N,) in seconds and poses (N, 4, 4) of a TUM trajectory."""
-    values = []
-    for number, row in _lines(path):
-        with read_as(f"{path}: line {number}", "timestamp tx ty tz qx qy qz qw"):
-            numbers = [float(cell) for cell in row]
-        if len(numbers) != 8 or not np.isfinite(numbers).all():
-            raise InputError(
-                f"{path}: line {number} must hold eight finite numbers: timestamp tx ty tz qx qy"
-                " qz qw"
-            )
-        if abs(float(np.linalg.norm(numbers[4:])) - 1.0) > UNIT_TOLERANCE:
-            raise InputError(f"{path}: line {number} holds a quaternion that is not of length 1")
-        values.append(numbers)
-    if len(values) < 2:
-        raise InputError(f"{path}: holds {len(values)} poses; a trajectory has two or more")
-    table = np.array(values)
-    table = table[np.argsort(table[:, 0], kind="stable")]
-    rising = np.concatenate([[True], np.diff(table[:, 0]) > 0.0])
-    table = table[rising]
-    return table[:, 0], pose_from_quat(table[:, 1:4], table[:, [7, 4, 5, 6]])

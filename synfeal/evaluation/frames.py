@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from synfeal.dataset.frame_files import sequence_at
 from synfeal.dataset.frame_poses import read_poses, rigid_problems
 from synfeal.dataset.manifest import MANIFEST
+from synfeal.dataset.pose_list import KITTI, FrameKey, PoseList
 from synfeal.dataset.pose_table import IMAGE, read_pose_table
 from synfeal.dataset.posed_sequence import is_tum, read_posed_sequence
 from synfeal.dataset.sequence_listing import (
@@ -28,7 +29,6 @@ from synfeal.dataset.sequence_listing import (
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.dataset.split_frames import read_splits, rows_of_frames, table_problems
 from synfeal.errors import InputError
-from synfeal.evaluation.estimates import KITTI, Estimates, FrameKey
 
 Array = NDArray[np.float64]
 
@@ -184,7 +184,7 @@ def _paths(dataset: Path, split: str, frames: Sequence[Frame]) -> NDArray[np.int
 
 
 def match(
-    frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float
+    frames: ScoredFrames, estimates: PoseList, path: Path, rate_hz: float
 ) -> NDArray[np.int64]:
     """Find each frame's estimate by name, index or time.
 
@@ -222,7 +222,7 @@ def match(
     return row
 
 
-def _keys(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float) -> list[Key]:
+def _keys(frames: ScoredFrames, estimates: PoseList, path: Path, rate_hz: float) -> list[Key]:
     """Return sequence and number of each estimate's frame."""
     pairs = list(zip(estimates.names, estimates.places, strict=True))
     if estimates.frame_key == "index":
@@ -234,7 +234,7 @@ def _keys(frames: ScoredFrames, estimates: Estimates, path: Path, rate_hz: float
     return [find(name, stems, f"{path}: {place}", rate_hz) for name, place in pairs]
 
 
-def _check_countable(frames: ScoredFrames, n_named: int, path: Path, estimates: Estimates) -> None:
+def _check_countable(frames: ScoredFrames, n_named: int, path: Path, estimates: PoseList) -> None:
     """Refuse indices in place of names where they may count other frames than these."""
     remedy = f"give names in a last column {IMAGE} (seq-01/frame-000000.color.png)"
     if estimates.kind == KITTI:

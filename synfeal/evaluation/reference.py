@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.dataset.pose_list import FrameKey, PoseList
+from synfeal.dataset.poses_in import read_pose_list
 from synfeal.errors import InputError
-from synfeal.evaluation.estimates import Estimates, FrameKey
-from synfeal.evaluation.formats import read_estimates
 from synfeal.evaluation.frames import NAME, ScoredFrames
 
 Array = NDArray[np.float64]
@@ -31,12 +31,12 @@ def read_reference(path: Path) -> ScoredFrames:
     """Read the poses of a file as the frames that are scored.
 
     Args:
-        path: Any file that :func:`synfeal.evaluation.formats.read_estimates` reads.
+        path: Any file that :func:`synfeal.dataset.poses_in.read_pose_list` reads.
 
     Raises:
         InputError: It cannot be read, has a pose twice, or one that is no rotation and position.
     """
-    found = read_estimates(path)
+    found = read_pose_list(path)
     world_from_cam = found.world_from_cam(found.convention)
     lost = np.flatnonzero(~np.isfinite(world_from_cam).all(axis=(1, 2)))
     if len(lost):
@@ -56,7 +56,7 @@ def read_reference(path: Path) -> ScoredFrames:
     )
 
 
-def _keys(found: Estimates) -> tuple[str, ...]:
+def _keys(found: PoseList) -> tuple[str, ...]:
     """Spell names (N) alike where they say sequence and frame; leave others as they are."""
     if found.frame_key != "name":
         return found.names
@@ -69,7 +69,7 @@ def _spelled(name: str) -> str:
     return name if sequence is None else f"seq-{int(sequence):02d}/frame-{number}"
 
 
-def _refuse_twice(path: Path, found: Estimates, names: tuple[str, ...]) -> None:
+def _refuse_twice(path: Path, found: PoseList, names: tuple[str, ...]) -> None:
     first: dict[str, str] = {}
     for name, place in zip(names, found.places, strict=True):
         if name in first:
@@ -85,7 +85,7 @@ def _sequences(names: tuple[str, ...]) -> NDArray[np.int64]:
     return np.unique(folders, return_inverse=True)[1].astype(np.int64)
 
 
-def match_reference(frames: ScoredFrames, estimates: Estimates, path: Path) -> NDArray[np.int64]:
+def match_reference(frames: ScoredFrames, estimates: PoseList, path: Path) -> NDArray[np.int64]:
     """Find the row (N,) of each frame's estimate; -1 where there is none.
 
     Args:
@@ -127,7 +127,7 @@ def match_reference(frames: ScoredFrames, estimates: Estimates, path: Path) -> N
 
 
 def met_in_time(
-    frames: ScoredFrames, estimates: Estimates, path: Path
+    frames: ScoredFrames, estimates: PoseList, path: Path
 ) -> tuple[ScoredFrames, NDArray[np.int64]]:
     """Leave out the frames at whose times nothing was estimated.
 

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.known_camera import camera_of_dataset
+from synfeal.dataset.pose_list import CONVENTIONS, Convention, PoseList
 from synfeal.dataset.pose_table import PoseTable
+from synfeal.dataset.poses_in import FormatName, read_pose_list
 from synfeal.dataset.sequence_listing import DEPTH
 from synfeal.errors import InputError, why
 from synfeal.evaluation.bootstrap import FEWEST_PATHS
-from synfeal.evaluation.estimates import CONVENTIONS, Convention, Estimates, checked_convention
-from synfeal.evaluation.formats import FormatName, read_estimates
+from synfeal.evaluation.estimates import checked_convention
 from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
 from synfeal.evaluation.reference import match_reference, met_in_time, read_reference
@@ -51,7 +52,7 @@ class Evaluation:
     """Errors, scores and the frames and poses they are of."""
 
     frames: ScoredFrames  # what was scored
-    estimates: Estimates  # what was read
+    estimates: PoseList  # what was read
     convention: Convention  # as which its poses were taken
     row: NDArray[np.int64]  # (N,) which estimate is of each frame, -1 where none is
     rotations: NDArray[np.bool_]  # (N,) frames whose estimate is a rotation
@@ -81,7 +82,7 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     if settings.rate_hz is not None and not 0 < settings.rate_hz < np.inf:
         raise InputError(f"--rate: must be above 0 frames a second, found {settings.rate_hz:g}")
     frames = _scored(dataset, settings)
-    estimates = read_estimates(poses, settings.file_format)
+    estimates = read_pose_list(poses, settings.file_format)
     _refuse_useless(dataset, poses, frames, estimates, settings)
     if frames.frame_key == "time":
         frames, row = met_in_time(frames, estimates, poses)
@@ -108,7 +109,7 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
 
 
 def _refuse_useless(
-    dataset: Path, path: Path, frames: ScoredFrames, estimates: Estimates, settings: Settings
+    dataset: Path, path: Path, frames: ScoredFrames, estimates: PoseList, settings: Settings
 ) -> None:
     """Refuse a rate where nothing has times, and an order of quaternions where there are none."""
     if settings.rate_hz is not None:
@@ -136,7 +137,7 @@ def _scored(dataset: Path, settings: Settings) -> ScoredFrames:
 
 
 def _matched(
-    frames: ScoredFrames, estimates: Estimates, path: Path, settings: Settings
+    frames: ScoredFrames, estimates: PoseList, path: Path, settings: Settings
 ) -> NDArray[np.int64]:
     """Find the row (N,) of each frame's estimate; -1 where there is none."""
     if frames.frame_key is not None:
@@ -162,7 +163,7 @@ def _camera_and_depth(
 def _taken(
     path: Path,
     frames: ScoredFrames,
-    estimates: Estimates,
+    estimates: PoseList,
     row: NDArray[np.int64],
     settings: Settings,
     convention: str | None,
@@ -190,7 +191,7 @@ def _taken(
 
 def _labels(path: Path, frames: ScoredFrames, settings: Settings) -> Array:
     """Read poses (N, 4, 4) of a second yardstick, which must have every frame."""
-    estimates = read_estimates(path)
+    estimates = read_pose_list(path)
     row = _matched(frames, estimates, path, settings)
     _, poses = _taken(path, frames, estimates, row, settings, None)
     lost = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))

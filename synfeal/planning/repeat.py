@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.frame_files import FrameFile
-from synfeal.dataset.pose_table import PoseTable, check_places, check_unit, read_pose_table
+from synfeal.dataset.pose_table import PoseTable, check_places, read_pose_table
+from synfeal.dataset.poses_in import read_trajectory
 from synfeal.dataset.sequence_listing import POSE, list_sequence
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_pose, read_split
-from synfeal.errors import InputError, read_as
+from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.geometry.rigid import refuse_non_rigid
 from synfeal.geometry.rotations import canonical_quat_wxyz
-
-TUM_ROW = "timestamp tx ty tz qx qy qz qw"
 
 log = logging.getLogger("synfeal")
 
@@ -110,29 +109,9 @@ def _rigid(path: FrameFile) -> NDArray[np.float64]:
 
 
 def _read_tum(path: Path) -> PoseTable:
-    """Read a trajectory of lines ``timestamp tx ty tz qx qy qz qw``; ``#`` starts a comment."""
-    with read_as(path, "a trajectory"):
-        lines = [line.partition("#")[0].split() for line in path.read_text("utf-8").splitlines()]
-    rows = {number: line for number, line in enumerate(lines, 1) if line}
-    values = np.array([_tum_row(path, number, line) for number, line in rows.items()])
-    values = values.reshape(-1, 8)
-    quat = values[:, [7, 4, 5, 6]]
-    check_places(values[:, 1:4], path, np.array(list(rows)))
-    check_unit(quat, path, np.array(list(rows)))
-    index = np.arange(len(values))
-    return PoseTable(index, np.zeros_like(index), values[:, 1:4], canonical_quat_wxyz(quat))
-
-
-def _tum_row(path: Path, number: int, line: list[str]) -> list[float]:
-    """Read the eight finite numbers of a line."""
-    try:
-        values = [float(cell) for cell in line]
-    except ValueError as error:
-        values = []
-        if "," in "".join(line):
-            raise InputError(
-                f"{path}: line {number} has commas; {TUM_ROW} are separated by blanks"
-            ) from error
-    if len(values) != 8 or not np.isfinite(values).all():
-        raise InputError(f"{path}: line {number} must hold eight finite numbers: {TUM_ROW}")
-    return values
+    """Read a TUM trajectory, all of it one path."""
+    found = read_trajectory(path)
+    index = np.arange(len(found))
+    return PoseTable(
+        index, np.zeros_like(index), found.position_m, canonical_quat_wxyz(found.quat_wxyz)
+    )

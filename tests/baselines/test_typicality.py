@@ -23,7 +23,7 @@ from baselines.training.typicality import (
     typicality,
 )
 from synfeal.cli import main
-from synfeal.evaluation.formats import read_estimates
+from synfeal.dataset.poses_in import read_pose_list
 from synfeal.records.tables import read_records
 from tests.support.collected import refused
 from tests.support.colored_frames import CPU, PX, colored_frames, untrained
@@ -290,7 +290,7 @@ def test_pictures_of_another_place_are_told(calibrated, place, tmp_path, caplog)
     np.testing.assert_allclose([float(row["typicality"]) for row in rows], expected, atol=0.01)
     assert [row["status"] for row in rows].count("inside") >= 34
     assert "are unlike" not in caplog.text
-    assert len(read_estimates(tmp_path / "poses.csv").names) == 40
+    assert len(read_pose_list(tmp_path / "poses.csv").names) == 40
 
 
 def test_a_model_without_a_calibration_says_so_in_one_line(calibrated, tmp_path, caplog):

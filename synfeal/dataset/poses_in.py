@@ -1,4 +1,4 @@
-"""Readers of pose files, and recognition of each format by its content.
+"""The one reader of pose files and trajectories, which tells each format by its content.
 
 - 7-Scenes: ``seq-XX/frame-XXXXXX.pose.txt``, four rows of ``world_from_cam``.
 - TUM RGB-D ("File Formats"): ``timestamp tx ty tz qx qy qz qw``, ``world_from_cam``.
@@ -30,20 +30,22 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.pose_table import COLUMNS, IMAGE, SEEN, SUPPORT
+from synfeal.dataset.pose_list import KITTI, Convention, FrameKey, PoseList
+from synfeal.dataset.pose_table import COLUMNS, IMAGE, SEEN, SUPPORT, check_places, check_unit
 from synfeal.dataset.sequence_listing import POSE, list_sequences, refuse_problems
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
-from synfeal.evaluation.estimates import KITTI, Convention, Estimates, FrameKey
-from synfeal.geometry.poses import quat_wxyz_of
+from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 from synfeal.geometry.rigid import RIGID_BOUND, rigid_defects
 from synfeal.records.tables import is_number, parse_cells
 
 Array = NDArray[np.float64]
+Rows = list[tuple[int, list[str]]]  # numbers of lines, from 1, and their columns
 
 OURS, COLMAP = Convention("world_from_cam", "wxyz"), Convention("cam_from_world", "wxyz")
 TUM = Convention("world_from_cam", "xyzw")
 MODELS = ("images.txt", "images.bin")
+TUM_ROW = "timestamp tx ty tz qx qy qz qw"
 # 1973 in nanoseconds: what seconds, milliseconds and microseconds of today do not reach.
 LEAST_STAMP_NS = 10**17
 
@@ -84,7 +86,7 @@ LINE_FORMATS: dict[FormatName, LineFormat] = {
 }
 
 
-def read_estimates(path: Path, file_format: FormatName | None = None) -> Estimates:
+def read_pose_list(path: Path, file_format: FormatName | None = None) -> PoseList:
     """Read poses from any of the formats above.
 
     Args:
@@ -104,9 +106,7 @@ def read_estimates(path: Path, file_format: FormatName | None = None) -> Estimat
         raise InputError(f"{path}: missing; give a file of poses, or a directory")
     with read_as(path, "poses"):
         text = path.read_text(encoding="utf-8-sig")
-    spaced = text.replace(",", " ") if file_format == "tum" else text
-    rows = [(i, line.split()) for i, line in enumerate(spaced.splitlines(), start=1)]
-    rows = [(i, row) for i, row in rows if row and not row[0].startswith("#")]
+    rows = _rows(text.replace(",", " ") if file_format == "tum" else text)
     if not rows:
         raise InputError(f"{path}: holds no poses")
     if file_format in ("7scenes", "colmap"):
@@ -120,7 +120,73 @@ def read_estimates(path: Path, file_format: FormatName | None = None) -> Estimat
     return read_lines(path, rows, file_format)
 
 
-def _name_of(found: Estimates) -> FormatName:
+def _rows(text: str) -> Rows:
+    """Split lines into columns, numbered from 1, without blank ones and comments."""
+    rows = [(i, line.split()) for i, line in enumerate(text.splitlines(), start=1)]
+    return [(i, row) for i, row in rows if row and not row[0].startswith("#")]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Poses at times, in the order of their lines.
+
+    Attributes:
+        stamps_s: Times (N,), seconds.
+        position_m: Positions (N, 3) of the camera in the world, metres.
+        quat_wxyz: Quaternions (N, 4) of ``world_from_cam``, of unit length up to rounding.
+    """
+
+    stamps_s: Array
+    position_m: Array
+    quat_wxyz: Array
+
+    def __len__(self) -> int:
+        return len(self.stamps_s)
+
+    @property
+    def world_from_cam(self) -> Array:
+        """Poses (N, 4, 4)."""
+        return pose_from_quat(self.position_m, self.quat_wxyz)
+
+    def by_time(self) -> Trajectory:
+        """Order poses by time; of several at the same time the first is kept."""
+        order = np.argsort(self.stamps_s, kind="stable")
+        kept = order[np.concatenate([[True], np.diff(self.stamps_s[order]) > 0.0])]
+        return Trajectory(self.stamps_s[kept], self.position_m[kept], self.quat_wxyz[kept])
+
+
+def read_trajectory(path: Path) -> Trajectory:
+    """Read a TUM trajectory of which every pose is needed: whole, finite, and of unit quaternions.
+
+    Args:
+        path: Lines ``timestamp tx ty tz qx qy qz qw``; ``#`` starts a comment, also after a pose.
+
+    Raises:
+        InputError: The file is missing, or a line holds no such pose.
+    """
+    with read_as(path, "a trajectory"):
+        text = path.read_text(encoding="utf-8-sig")
+    rows = _rows("\n".join(line.partition("#")[0] for line in text.splitlines()))
+    if not rows:
+        raise InputError(f"{path}: holds no poses; a trajectory has lines {TUM_ROW}")
+    for line, row in rows:
+        if any("," in cell for cell in row):
+            raise InputError(f"{path}: line {line} has commas; {TUM_ROW} are separated by blanks")
+        if len(row) != 8 or not all(map(is_number, row)) or not np.isfinite(_floats(row)).all():
+            raise InputError(f"{path}: line {line} must hold eight finite numbers: {TUM_ROW}")
+    found = read_lines(path, rows, "tum")
+    lines = np.array([line for line, _ in rows])
+    check_places(found.translation, path, lines)
+    check_unit(found.quat, path, lines)
+    stamps_s = np.array(found.names, np.float64)
+    return Trajectory(stamps_s, found.translation, found.quat[:, [3, 0, 1, 2]])
+
+
+def _floats(row: Sequence[str]) -> Array:
+    return np.array(row, np.float64)
+
+
+def _name_of(found: PoseList) -> FormatName:
     """Name the format of poses that were read from a directory."""
     names: dict[str, FormatName] = {
         "a 7-Scenes tree": "7scenes",
@@ -130,7 +196,7 @@ def _name_of(found: Estimates) -> FormatName:
     return names[found.kind]
 
 
-def _from_directory(path: Path) -> Estimates:
+def _from_directory(path: Path) -> PoseList:
     places = (path, path / "sparse" / "0", path / "0")
     models = [p for p in places if any((p / name).is_file() for name in MODELS)]
     sequences = any(p.is_dir() or p.suffix == ".zip" for p in path.glob("seq-*"))
@@ -150,7 +216,7 @@ def _from_directory(path: Path) -> Estimates:
     )
 
 
-def read_sevenscenes(path: Path) -> Estimates:
+def read_sevenscenes(path: Path) -> PoseList:
     """Read a tree of ``pose.txt`` files."""
     sequences = list_sequences(path)
     refuse_problems(sequences)
@@ -160,7 +226,7 @@ def read_sevenscenes(path: Path) -> Estimates:
     if not frames:
         raise InputError(f"{path}: its sequences hold no frame-XXXXXX.pose.txt")
     matrices = np.array([read_pose(frame.path(POSE)) for _, frame in frames])
-    return Estimates(
+    return PoseList(
         "a 7-Scenes tree",
         OURS,
         tuple(f"{name}/frame-{frame.number:06d}" for name, frame in frames),
@@ -171,7 +237,7 @@ def read_sevenscenes(path: Path) -> Estimates:
     )
 
 
-def read_colmap(path: Path) -> Estimates:
+def read_colmap(path: Path) -> PoseList:
     """Read a COLMAP model, as text or binary, but not both."""
     import pycolmap
 
@@ -186,7 +252,7 @@ def read_colmap(path: Path) -> Estimates:
     if not poses:
         raise InputError(f"{path}: this COLMAP model has no image with a pose")
     names = tuple(image.name for image in images if image.has_pose)
-    return Estimates(
+    return PoseList(
         "a COLMAP model",
         COLMAP,
         names,
@@ -196,7 +262,7 @@ def read_colmap(path: Path) -> Estimates:
     )
 
 
-def read_csv(path: Path, text: str) -> Estimates:
+def read_csv(path: Path, text: str) -> PoseList:
     """Read a table of poses with a header."""
     table = parse_cells(path, text, remedy="correct the file")
     found = (IMAGE, *COLUMNS[2:])
@@ -213,7 +279,7 @@ def read_csv(path: Path, text: str) -> Estimates:
     values = table.numbers(COLUMNS[2:], may_be_empty)
     named = IMAGE in table.header
     names = table.header.index(IMAGE if named else "frame")
-    return Estimates(
+    return PoseList(
         "a pose table" if table.header[0] == COLUMNS[0] else "poses of synfeal localize",
         OURS,
         tuple(row[names] for row in table.rows),
@@ -224,7 +290,7 @@ def read_csv(path: Path, text: str) -> Estimates:
     )
 
 
-def read_euroc(path: Path, text: str, told: bool = True) -> Estimates:
+def read_euroc(path: Path, text: str, told: bool = True) -> PoseList:
     """Read EuRoC's ground truth, or a table of its first eight columns.
 
     Args:
@@ -261,7 +327,7 @@ def read_euroc(path: Path, text: str, told: bool = True) -> Estimates:
             " EuRoC's (nanoseconds, quaternion wxyz) or TUM's (seconds, xyzw); say which with"
             " --format euroc or tum"
         )
-    return Estimates(
+    return PoseList(
         "a EuRoC trajectory",
         OURS,
         tuple(f"{ns // 10**9}.{ns % 10**9:09d}" for ns in stamps_ns),
@@ -272,9 +338,7 @@ def read_euroc(path: Path, text: str, told: bool = True) -> Estimates:
     )
 
 
-def read_lines(
-    path: Path, rows: Sequence[tuple[int, list[str]]], file_format: FormatName | None = None
-) -> Estimates:
+def read_lines(path: Path, rows: Rows, file_format: FormatName | None = None) -> PoseList:
     """Read poses from lines of text.
 
     Args:
@@ -304,7 +368,7 @@ def read_lines(
         position, quat = values[:, :3], values[:, 3:]
     else:
         quat, position = values[:, :4], values[:, 4:]
-    return Estimates(
+    return PoseList(
         line_format.kind,
         line_format.convention,
         names,
@@ -342,11 +406,11 @@ def _line_format(
 
 def _of_matrices(
     path: Path, line_format: LineFormat, places: Sequence[str], rows: Sequence[Sequence[str]]
-) -> Estimates:
+) -> PoseList:
     """Read poses from lines of three rows of four numbers each."""
     matrices = np.tile(np.eye(4), (len(rows), 1, 1))
     matrices[:, :3] = _numbers(path, places, rows).reshape(-1, 3, 4)
-    return Estimates(
+    return PoseList(
         line_format.kind,
         line_format.convention,
         tuple(map(str, range(len(rows)))),
@@ -366,13 +430,13 @@ def _quat_of_rotations(matrices: Array) -> Array:
     return quat
 
 
-def read_tum_sequences(paths: Sequence[Path]) -> Estimates:
+def read_tum_sequences(paths: Sequence[Path]) -> PoseList:
     """Read ``seq-01.txt``, ``seq-02.txt``, ..., each a TUM trajectory."""
-    parts = [read_estimates(path) for path in paths]
+    parts = [read_pose_list(path) for path in paths]
     odd = [p for p, part in zip(paths, parts, strict=True) if part.convention != TUM]
     if odd:
         raise InputError(f"{odd[0]}: must be a TUM trajectory, as its name and directory say")
-    return Estimates(
+    return PoseList(
         "TUM trajectories",
         TUM,
         tuple(f"{p.stem}/{n}" for p, e in zip(paths, parts, strict=True) for n in e.names),

@@ -1,0 +1,72 @@
+"""Poses as read from a file: which frames they are of, and by which convention they are meant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synfeal.dataset.pose_table import UNIT_TOLERANCE
+from synfeal.geometry.poses import inverse, pose_from_quat
+
+Array = NDArray[np.float64]
+Direction = Literal["world_from_cam", "cam_from_world"]
+Order = Literal["wxyz", "xyzw"]
+# How a pose says which frame it is of: a name, a time in seconds, or the index of the frame
+# within the split.
+FrameKey = Literal["name", "time", "index"]
+KITTI = "KITTI poses"
+
+
+class Convention(NamedTuple):
+    """Direction of a pose, and the order of its quaternion."""
+
+    direction: Direction
+    order: Order
+
+    def __str__(self) -> str:
+        return f"{self.direction}-{self.order}"
+
+
+CONVENTIONS = {
+    str(c): c for c in (Convention(d, o) for d in get_args(Direction) for o in get_args(Order))
+}
+
+
+@dataclass(frozen=True)
+class PoseList:
+    """Poses read from a file or a directory."""
+
+    kind: str  # what it was read as, e.g. ``an ACE result file``.
+    convention: Convention  # that of ``kind``, which is how its poses are taken
+    names: tuple[str, ...]  # (N) what ``frame_key`` says: names, seconds or indices
+    places: tuple[str, ...]  # (N) where each stands, for messages
+    translation: Array  # (N, 3) fourth columns of the matrices
+    # (N, 4) quaternions in the order of ``convention``; not a number where a matrix is no rotation
+    quat: Array
+    frame_key: FrameKey = "name"
+    of_matrices: bool = False  # whether the file has matrices in place of quaternions
+
+    @property
+    def counts_seconds(self) -> bool:
+        """Check whether times are 0, 1, 2, ..., in one sequence or each: they may be numbers."""
+        if self.frame_key != "time" or len(self.names) < 2:
+            return False
+        stamps = [name.rpartition("/")[2] for name in self.names]
+        seconds = np.array(stamps, np.float64)
+        if seconds[0] != 0.0 or not np.isfinite(seconds).all():
+            return False
+        onwards = np.diff(seconds) == 1.0
+        return bool(onwards.any() and (onwards | (seconds[1:] == 0.0)).all())
+
+    def world_from_cam(self, convention: Convention) -> Array:
+        """Return poses (N, 4, 4), read by a convention; NaN where there is no rotation."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            off = np.abs(np.linalg.norm(self.quat, axis=1) - 1.0)
+        good = np.isfinite(self.translation).all(axis=1) & (off <= UNIT_TOLERANCE)
+        quat_wxyz = self.quat if convention.order == "wxyz" else np.roll(self.quat, 1, axis=1)
+        matrices = np.full((len(good), 4, 4), np.nan)
+        matrices[good] = pose_from_quat(self.translation[good], quat_wxyz[good])
+        return matrices if convention.direction == "world_from_cam" else inverse(matrices)
