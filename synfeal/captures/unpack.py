@@ -19,7 +19,7 @@ import numpy as np
 from PIL import Image
 
 from synfeal.camera.calibration import Calibration
-from synfeal.captures.capture import Capture, CapturedFrame, Colors, Depth, resized
+from synfeal.captures.capture import Array, Capture, CapturedFrame, Colors, Depth, resized
 from synfeal.captures.views import (
     common_camera,
     has_lens,
@@ -251,3 +251,20 @@ def read_capture_record(folder: Path) -> dict[str, Any] | None:
     if not isinstance(values, dict) or not isinstance(values.get("camera"), dict):
         raise InputError(f"{path}: is no record of a capture; unpack it again")
     return values
+
+
+def known_up(folder: Path) -> Array | None:
+    """Return the way up (3,), of length 1, in the world of an unpacked capture, where it is known.
+
+    Raises:
+        InputError: ``capture.json`` is there and cannot be read.
+    """
+    record = read_capture_record(folder)
+    if record is None or record.get("up") is None:
+        return None
+    with read_as(folder / RECORD, "the record of a capture", TypeError, ValueError):
+        up = np.array(record["up"], np.float64).reshape(3)
+        length = float(np.linalg.norm(up))
+        if not 0.5 < length < 2.0:
+            raise ValueError("'up' must be a direction of length 1")
+    return np.asarray(up / length)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
+from synfeal.camera.sensors import SENSORS
+from synfeal.captures.unpack import RECORD, read_capture_record
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
 from synfeal.dataset.depth import MILLIMETRES, Depth, read_depth_m
@@ -103,43 +105,19 @@ def pinhole(width: int, height: int, focal_px: float) -> CameraConfig:
     )
 
 
-def _tum(
-    fx: float, fy: float, cx: float, cy: float, *distortion: float
-) -> tuple[CameraConfig, CameraConfig]:
-    """Return one camera for both: the benchmark's depth is registered to colour."""
-    lens = (*distortion, 0.0, 0.0, 0.0, 0.0, 0.0)[:5]
-    camera = CameraConfig(
-        width=640,
-        height=480,
-        fx=fx,
-        fy=fy,
-        cx=cx + 0.5,
-        cy=cy + 0.5,
-        distortion=lens,
+def _preset(name: str) -> RgbdCamera:
+    sensor = SENSORS[name]
+    return RgbdCamera(
+        CameraConfig(**asdict(sensor.color)),
+        CameraConfig(**asdict(sensor.depth)),
+        np.eye(4),
+        sensor.depth_units_per_m,
+        f"preset {name}",
     )
-    return camera, camera
 
 
-def _known(pair: tuple[CameraConfig, CameraConfig], units_per_m: float, name: str) -> RgbdCamera:
-    return RgbdCamera(pair[0], pair[1], np.eye(4), units_per_m, f"preset {name}")
-
-
-# The Kinect of 7-Scenes: its authors give 585 px, which is the depth camera's; 525 px of the colour
-# camera is what its driver reports and what the photographs agree with. The Kinects of the TUM
-# benchmark: "Intrinsic Camera Calibration of the Kinect" on its page of file formats.
 PRESETS: Mapping[str, RgbdCamera] = {
-    "7scenes": _known((pinhole(640, 480, 525.0), pinhole(640, 480, 585.0)), 1000.0, "7scenes"),
-    "tum-fr1": _known(
-        _tum(517.3, 516.5, 318.6, 255.3, 0.2624, -0.9531, -0.0054, 0.0026, 1.1633),
-        5000.0,
-        "tum-fr1",
-    ),
-    "tum-fr2": _known(
-        _tum(520.9, 521.0, 325.1, 249.7, 0.2312, -0.7849, -0.0033, -0.0001, 0.9172),
-        5000.0,
-        "tum-fr2",
-    ),
-    "tum-fr3": _known(_tum(535.4, 539.2, 320.1, 247.6), 5000.0, "tum-fr3"),
+    name: _preset(name) for name in ("7scenes", "tum-fr1", "tum-fr2", "tum-fr3")
 }
 
 
@@ -212,7 +190,7 @@ def rgbd_camera(
     if options.preset is not None:
         base: RgbdCamera | None = PRESETS[options.preset]
     else:
-        base = _of_manifest(sequence)
+        base = _of_capture(sequence) or _of_manifest(sequence)
     color = _one(options.color_camera, options.color_focal_px, color_size, "color")
     depth = _one(options.depth_camera, options.depth_focal_px, depth_size, "depth")
     if base is None:
@@ -275,6 +253,24 @@ def _refuse_wide(camera: CameraConfig, name: str) -> None:
         raise InputError(
             f"{name}: is a camera of projection {camera.projection}, and a perspective one is"
             " needed; undistort the images first"
+        )
+
+
+def _of_capture(sequence: Path) -> RgbdCamera | None:
+    """Read the cameras of a capture that was unpacked."""
+    record = read_capture_record(sequence)
+    if record is None:
+        return None
+    camera = record["camera"]
+    with read_as(sequence / RECORD, "the record of a capture"):
+        color = CameraConfig.model_validate(camera["color"])
+        depth = CameraConfig.model_validate(camera.get("depth", camera["color"]))
+        return RgbdCamera(
+            color,
+            depth,
+            np.array(camera.get("depth_from_color", np.eye(4)), np.float64).reshape(4, 4),
+            float(camera.get("depth_units_per_m", MILLIMETRES)),
+            RECORD,
         )
 
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.captures.unpack import known_up
 from synfeal.dataset.depth_agreement import DepthAgreement, best_focal_px, check_depth, spread
 from synfeal.dataset.images import image_size
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
@@ -35,7 +36,7 @@ from synfeal.scanning.coloring import colors_of
 from synfeal.scanning.consistency import N_FRAMES as FIT_FRAMES
 from synfeal.scanning.consistency import ColorFit, fit_color, sightings_of, with_color
 from synfeal.scanning.fusion import FusedSurface, fuse
-from synfeal.scanning.gravity import Gravity, find_gravity, upright_world
+from synfeal.scanning.gravity import find_gravity, upright_world
 from synfeal.scanning.picture import Comparison, compare, write_picture
 
 Array = NDArray[np.float64]
@@ -64,7 +65,8 @@ class ScanJob:
         min_piece_m2: Connected pieces of less surface are dropped.
         poses_are: Direction of the poses, or ``opengl`` for ``world_from_cam`` of cameras with
             OpenGL's axes.
-        gravity: Way down (3,) in the sequence's world; ``find`` from the planes of the scene;
+        gravity: Way down (3,) in the sequence's world; ``find`` takes it from the device
+            where its capture says it, or else from the planes of the scene;
             ``keep`` leaves the axes as they are.
         keep_calibration: Use the colour calibration as it is given, not as photographs agree best.
     """
@@ -213,15 +215,19 @@ def _camera(job: ScanJob, frames: PosedFrames) -> RgbdCamera:
 
 def _world(
     job: ScanJob, surface: FusedSurface, frames: PosedFrames
-) -> tuple[Gravity | None, Array]:
-    """Return how gravity was found, if it was, and ``sequence_from_world`` (4, 4)."""
+) -> tuple[dict[str, Any] | str, Array]:
+    """Return how the way up is known, for the record, and ``sequence_from_world`` (4, 4)."""
     if job.gravity == "keep":
-        return None, np.eye(4)
+        return "kept", np.eye(4)
     if job.gravity == "find":
+        sensed = known_up(job.sequence)
+        if sensed is not None:
+            return "sensed by the device", upright_world(surface, sensed)
         found = find_gravity(surface, frames.world_from_cam)
-        return found, upright_world(surface, found.up)
+        record = {"up": found.up.tolist(), "level": found.level, "plumb": found.plumb}
+        return record, upright_world(surface, found.up)
     down = np.array(job.gravity, np.float64)
-    return None, upright_world(surface, -down / np.linalg.norm(down))
+    return "given", upright_world(surface, -down / np.linalg.norm(down))
 
 
 def _mesh(
@@ -264,13 +270,10 @@ def _record(
     camera: RgbdCamera,
     agreement: DepthAgreement,
     fit: ColorFit,
-    gravity: Gravity | None,
+    gravity: dict[str, Any] | str,
     compared: list[Comparison],
 ) -> dict[str, Any]:
     """Return the content of ``scan.json``, less the mesh itself."""
-    found = None
-    if gravity is not None:
-        found = {"up": gravity.up.tolist(), "level": gravity.level, "plumb": gravity.plumb}
     differences = np.array([one.difference for one in compared])
     return {
         "sequence": job.sequence.resolve().name,
@@ -287,7 +290,7 @@ def _record(
         "color_as_given": intrinsics_record(fit.given),
         "voxel_m": job.voxel_m,
         "max_depth_m": job.max_depth_m,
-        "gravity": found if found else "given" if job.gravity != "keep" else "kept",
+        "gravity": gravity,
         "depth_agreement": None if np.isnan(agreement.share) else agreement.share,
         "depth_best_focal_px": best_focal_px(agreement.sample, camera.depth),
         "color_disagreement": fit.record,

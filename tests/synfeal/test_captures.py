@@ -18,6 +18,8 @@ from synfeal.captures.formats import CaptureFormat, capture_formats, format_of, 
 from synfeal.captures.unpack import read_capture_record, unpack
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.errors import InputError
+from synfeal.geometry.poses import inverse
+from synfeal.scanning.run import ScanJob, scan
 from tests import ROOT
 from tests.support.capture_writers import (
     CX,
@@ -30,6 +32,7 @@ from tests.support.capture_writers import (
     Z_UP_FROM_ROOM,
     shots,
 )
+from tests.support.small_room import furnished_room
 
 FORMATS = sorted(WRITERS)
 LOSSLESS = ("7scenes", "transforms", "arkitscenes", "colmap", "colmap-binary")
@@ -267,3 +270,24 @@ def test_a_format_of_another_package_is_found_and_read(tmp_path):
         check=True,
     )
     assert done.stdout.split("\n")[:2] == ["cart 2 2.5 (480, 640, 3)", "1.25"]
+
+
+@pytest.mark.parametrize("name", ["polycam", "scannet", "record3d", "transforms"])
+def test_scanned_without_an_option_it_is_the_room(name, tmp_path):
+    """Calibrations, depth scale and axes all come with the capture."""
+    o3d = pytest.importorskip("open3d")
+    path, world_from_room = written(name, tmp_path)
+    done = unpack(read_capture(path), tmp_path / "sequence")
+    made = scan(ScanJob(done.folder, tmp_path / "scan.glb", voxel_m=0.02, max_depth_m=6.0))
+    record = made.record
+    if read_capture(path).up is not None:
+        assert record["gravity"] == "sensed by the device"
+    room_from_world = inverse(world_from_room) @ np.array(record["sequence_from_world"])
+    np.testing.assert_allclose(room_from_world[2, :3], [0, 0, 1], atol=0.01)  # it stands upright
+    vertices = made.mesh.merged()[0] @ room_from_world[:3, :3].T + room_from_world[:3, 3]
+    true_vertices, true_faces = furnished_room((4.0, 12.0, 40.0)).merged()
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(true_vertices.astype(np.float32), true_faces.astype(np.uint32))
+    distance_m = scene.compute_distance(vertices.astype(np.float32)).numpy()
+    assert np.median(distance_m) < 0.005
+    assert np.quantile(distance_m, 0.9) < 0.01
