@@ -10,7 +10,7 @@ from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
 from synfeal import __version__
-from synfeal.cli import datasets, meshes
+from synfeal.cli import capturing, datasets, meshes
 from synfeal.cli.options import Command, numbers_apart
 from synfeal.errors import exit_status
 
@@ -27,6 +27,7 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 OWN_COMMANDS: tuple[Command, ...] = (
+    capturing.unpack,
     meshes.scan,
     meshes.collect,
     meshes.inspect,

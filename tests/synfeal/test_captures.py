@@ -16,6 +16,7 @@ from PIL import Image
 from synfeal.captures.capture import Capture
 from synfeal.captures.formats import CaptureFormat, capture_formats, format_of, read_capture
 from synfeal.captures.unpack import read_capture_record, unpack
+from synfeal.cli import main
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
@@ -291,3 +292,28 @@ def test_scanned_without_an_option_it_is_the_room(name, tmp_path):
     distance_m = scene.compute_distance(vertices.astype(np.float32)).numpy()
     assert np.median(distance_m) < 0.005
     assert np.quantile(distance_m, 0.9) < 0.01
+
+
+def test_the_command_says_what_it_found_and_what_comes_next(tmp_path, capsys, caplog):
+    path, _ = written("3d-scanner-app", tmp_path)
+    out = tmp_path / "sequence"
+    assert main(["unpack", str(path), "--out", str(out), "--every", "4"]) == 0
+    said = capsys.readouterr().out
+    assert "40 frames of 3d Scanner App" in said
+    assert f"{out}: 10 frames, 240 x 180 pixels, focal length 180, depth 120 x 90" in said
+    assert f"synfeal scan {out} --out scan.glb" in said
+    assert "no photograph" in caplog.text
+    assert len(list(out.glob("*.pose.txt"))) == 10
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [(["--every", "0"], "--every"), (["--format", "fbx"], "fbx is none of tum, 7scenes")],
+)
+def test_bad_options_are_one_line_and_write_nothing(options, said, tmp_path, capsys):
+    path, _ = written("colmap", tmp_path)
+    assert main(["unpack", str(path), "--out", str(tmp_path / "out"), *options]) == 1
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
