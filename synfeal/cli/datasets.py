@@ -11,13 +11,14 @@ from synfeal.errors import InputError
 
 FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "rosbag", "tum")
 CONVENTIONS = tuple(
-    f"{direction}-{order}"
+    f"{direction}-{order}{axes}"
+    for axes in ("", "-opengl")
     for direction in ("world_from_cam", "cam_from_world")
     for order in ("wxyz", "xyzw")
 )
 # fmt: off
 POSE_FORMATS = (
-    "7scenes", "tum", "kitti", "euroc", "colmap", "hloc", "pgt", "ace", "ace0", "csv",
+    "7scenes", "tum", "kitti", "euroc", "colmap", "kapture", "hloc", "pgt", "ace", "ace0", "csv",
 )
 # fmt: on
 LAYERS = ("color", "depth", "normals", "masks", "right", "right-depth")
@@ -175,7 +176,7 @@ def pairs(arguments: argparse.Namespace) -> None:
     option(
         "poses",
         "7-Scenes tree, TUM trajectory (or a directory of seq-01.txt, ...), KITTI, EuRoC, COLMAP"
-        " model, result file of hloc, ACE, ACE0 or DSAC*, pseudo ground truth, pose table,"
+        " model, kapture, result file of hloc, ACE, ACE0 or DSAC*, pseudo ground truth, pose table,"
         " poses.csv of synfeal localize",
         type=Path,
         metavar="POSES",
@@ -197,7 +198,19 @@ def pairs(arguments: argparse.Namespace) -> None:
     option(
         "--convention",
         "convention of POSES, where it is not that of their format",
-        choices=CONVENTIONS,
+        choices=(*CONVENTIONS, "opengl"),
+    ),
+    option(
+        "--max-difference",
+        "between two files of poses: largest difference of two times of a pair, seconds (0.01)",
+        type=float,
+        metavar="S",
+    ),
+    option(
+        "--offset",
+        "between two files of poses: seconds to add to the times of POSES (0)",
+        type=float,
+        metavar="S",
     ),
     option("--rate", "with TUM and EuRoC: frames per second (30)", type=float, metavar="HZ"),
     CAMERA,
@@ -220,6 +233,8 @@ def evaluate(arguments: argparse.Namespace) -> None:
         labels=arguments.labels,
         camera=arguments.camera,
         file_format=arguments.file_format,
+        most_apart_s=0.01 if arguments.max_difference is None else arguments.max_difference,
+        offset_s=arguments.offset or 0.0,
     )
     found = run.evaluate(arguments.dataset, arguments.poses, settings)
     print(report_text(arguments.poses, settings, found), end="")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.pose_table import UNIT_TOLERANCE
+from synfeal.geometry.axes import CameraAxes, with_our_axes
 from synfeal.geometry.poses import inverse, pose_from_quat
 
 Array = NDArray[np.float64]
@@ -21,18 +22,36 @@ KITTI = "KITTI poses"
 
 
 class Convention(NamedTuple):
-    """Direction of a pose, and the order of its quaternion."""
+    """Direction of a pose, the order of its quaternion, and the axes of its camera."""
 
     direction: Direction
     order: Order
+    axes: CameraAxes = "opencv"
 
     def __str__(self) -> str:
-        return f"{self.direction}-{self.order}"
+        name = f"{self.direction}-{self.order}"
+        return name if self.axes == "opencv" else f"{name}-{self.axes}"
 
 
+AXES: tuple[CameraAxes, ...] = ("opencv", "opengl")
 CONVENTIONS = {
-    str(c): c for c in (Convention(d, o) for d in get_args(Direction) for o in get_args(Order))
+    str(c): c
+    for c in (
+        Convention(direction, order, axes)
+        for axes in AXES
+        for direction in get_args(Direction)
+        for order in get_args(Order)
+    )
 }
+# What a format says, but of cameras with OpenGL's axes.
+OPENGL = "opengl"
+
+
+def named_convention(name: str | None, of_format: Convention) -> Convention:
+    """Find the convention that ``--convention`` names; None stands for that of the format."""
+    if name is None:
+        return of_format
+    return of_format._replace(axes="opengl") if name == OPENGL else CONVENTIONS[name]
 
 
 @dataclass(frozen=True)
@@ -69,4 +88,5 @@ class PoseList:
         quat_wxyz = self.quat if convention.order == "wxyz" else np.roll(self.quat, 1, axis=1)
         matrices = np.full((len(good), 4, 4), np.nan)
         matrices[good] = pose_from_quat(self.translation[good], quat_wxyz[good])
-        return matrices if convention.direction == "world_from_cam" else inverse(matrices)
+        poses = matrices if convention.direction == "world_from_cam" else inverse(matrices)
+        return with_our_axes(poses, convention.axes)

@@ -44,6 +44,7 @@ RGB_LIST, DEPTH_LIST, TRAJECTORY = "rgb.txt", "depth.txt", "groundtruth.txt"
 # each of the two poses it lies between: what the benchmark's own ``associate.py`` takes, and ten
 # poses of its motion capture.
 DEPTH_SLACK_S, POSE_SLACK_S = 0.02, 0.1
+SAME_TIME_S = 1e-4  # what times are rounded to in other people's files
 
 log = logging.getLogger("synfeal")
 Array = NDArray[np.float64]
@@ -251,13 +252,16 @@ def _read_tum(path: Path) -> PosedFrames:
         nearest = np.abs(depth_s[None, :] - color_s[:, None]).argmin(axis=1)
         keep &= np.abs(depth_s[nearest] - color_s) <= DEPTH_SLACK_S
         depth = [files[index] for index in nearest]
-    trajectory = read_trajectory(path / TRAJECTORY).by_time()
+    trajectory = read_trajectory(path / TRAJECTORY).by_time(path / TRAJECTORY)
     if len(trajectory) < 2:
         raise InputError(f"{path / TRAJECTORY}: holds one pose; a trajectory has two or more")
     pose_s, poses = trajectory.stamps_s, trajectory.world_from_cam
     after = np.searchsorted(pose_s, color_s).clip(1, len(pose_s) - 1)
     gap_s = np.maximum(color_s - pose_s[after - 1], pose_s[after] - color_s)
-    keep &= (gap_s <= POSE_SLACK_S) & (color_s >= pose_s[0]) & (color_s <= pose_s[-1])
+    between = (gap_s <= POSE_SLACK_S) & (color_s >= pose_s[0]) & (color_s <= pose_s[-1])
+    # A pose of that very moment needs no neighbour to interpolate with.
+    exact = np.minimum(np.abs(color_s - pose_s[after - 1]), np.abs(pose_s[after] - color_s))
+    keep &= between | (exact <= SAME_TIME_S)
     kept = np.flatnonzero(keep)
     if not len(kept):
         raise InputError(
@@ -272,7 +276,8 @@ def _read_tum(path: Path) -> PosedFrames:
             len(color),
         )
     fraction = (color_s - pose_s[after - 1]) / (pose_s[after] - pose_s[after - 1])
-    between = [interpolate(poses[after[i] - 1], poses[after[i]], fraction[i])[0] for i in kept]
+    fraction = fraction.clip(0.0, 1.0)
+    found = [interpolate(poses[after[i] - 1], poses[after[i]], fraction[i])[0] for i in kept]
     for file in (file for i in kept for file in (color[i], depth[i])):
         if file is not None and not file.is_file():
             raise InputError(f"{file}: missing, a list names it; copy the sequence again")
@@ -280,7 +285,7 @@ def _read_tum(path: Path) -> PosedFrames:
         names=tuple(color[i].stem for i in kept),
         color=tuple(color[i] for i in kept),
         depth=tuple(depth[i] for i in kept),
-        world_from_cam=np.array(between),
+        world_from_cam=np.array(found),
     )
 
 

@@ -8,6 +8,8 @@
   whole nanoseconds, position and quaternion ``wxyz`` of ``world_from_body``, and further columns.
   Without these, and with times that may be seconds, it may be TUM with commas: a person says which.
 - COLMAP ("Output Format"): ``images.txt`` or ``images.bin``, ``cam_from_world``, ``wxyz``.
+- kapture: ``sensors/trajectories.txt``, ``timestamp, device, qw, ..., tz``, ``cam_from_world``;
+  ``records_camera.txt`` beside it names the images.
 - hloc (``localize_sfm``) and visuallocalization.net: ``name qw qx qy qz tx ty tz``,
   ``cam_from_world``.
 - Pseudo ground truth (``tsattler/visloc_pseudo_gt_limitations``): the same and the focal length;
@@ -31,6 +33,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.pose_list import KITTI, Convention, FrameKey, PoseList
+from synfeal.dataset.pose_models import (
+    COLMAP,
+    MODELS,
+    TRAJECTORIES,
+    is_kapture,
+    read_colmap,
+    read_kapture,
+)
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, SEEN, SUPPORT, check_places, check_unit
 from synfeal.dataset.sequence_listing import POSE, list_sequences, refuse_problems
 from synfeal.dataset.sevenscenes import read_pose
@@ -42,15 +52,25 @@ from synfeal.records.tables import is_number, parse_cells
 Array = NDArray[np.float64]
 Rows = list[tuple[int, list[str]]]  # numbers of lines, from 1, and their columns
 
-OURS, COLMAP = Convention("world_from_cam", "wxyz"), Convention("cam_from_world", "wxyz")
+OURS = Convention("world_from_cam", "wxyz")
 TUM = Convention("world_from_cam", "xyzw")
-MODELS = ("images.txt", "images.bin")
 TUM_ROW = "timestamp tx ty tz qx qy qz qw"
 # 1973 in nanoseconds: what seconds, milliseconds and microseconds of today do not reach.
 LEAST_STAMP_NS = 10**17
+SAME_PLACE_M = 1e-3  # two poses of one time that are nearer are one pose written twice
 
 FormatName = Literal[
-    "7scenes", "tum", "kitti", "euroc", "colmap", "hloc", "pgt", "ace", "ace0", "csv"
+    "7scenes",
+    "tum",
+    "kitti",
+    "euroc",
+    "colmap",
+    "kapture",
+    "hloc",
+    "pgt",
+    "ace",
+    "ace0",
+    "csv",
 ]
 FORMATS: tuple[FormatName, ...] = get_args(FormatName)
 
@@ -106,6 +126,8 @@ def read_pose_list(path: Path, file_format: FormatName | None = None) -> PoseLis
         raise InputError(f"{path}: missing; give a file of poses, or a directory")
     with read_as(path, "poses"):
         text = path.read_text(encoding="utf-8-sig")
+    if file_format == "kapture" or (file_format is None and is_kapture(text)):
+        return read_kapture(path)
     rows = _rows(text.replace(",", " ") if file_format == "tum" else text)
     if not rows:
         raise InputError(f"{path}: holds no poses")
@@ -148,10 +170,26 @@ class Trajectory:
         """Poses (N, 4, 4)."""
         return pose_from_quat(self.position_m, self.quat_wxyz)
 
-    def by_time(self) -> Trajectory:
-        """Order poses by time; of several at the same time the first is kept."""
+    def by_time(self, path: Path) -> Trajectory:
+        """Order poses by time; of a pose that is written twice the first is kept.
+
+        Args:
+            path: Their file, for messages.
+
+        Raises:
+            InputError: Two poses of one time differ, so nothing says which is meant.
+        """
         order = np.argsort(self.stamps_s, kind="stable")
-        kept = order[np.concatenate([[True], np.diff(self.stamps_s[order]) > 0.0])]
+        is_new = np.concatenate([[True], np.diff(self.stamps_s[order]) > 0.0])
+        kept = order[is_new]
+        moved_m = np.abs(np.diff(self.position_m[order], axis=0)).max(axis=1, initial=0.0)
+        differing = np.flatnonzero(~is_new[1:] & (moved_m > SAME_PLACE_M))
+        if len(differing):
+            raise InputError(
+                f"{path}: the time {self.stamps_s[order[differing[0]]]:.6f} has two different poses"
+                f" ({len(order)} poses at {len(kept)} times); are two runs in one file, or times"
+                " rounded?"
+            )
         return Trajectory(self.stamps_s[kept], self.position_m[kept], self.quat_wxyz[kept])
 
 
@@ -191,6 +229,7 @@ def _name_of(found: PoseList) -> FormatName:
     names: dict[str, FormatName] = {
         "a 7-Scenes tree": "7scenes",
         "a COLMAP model": "colmap",
+        "kapture trajectories": "kapture",
         "TUM trajectories": "tum",
     }
     return names[found.kind]
@@ -201,11 +240,14 @@ def _from_directory(path: Path) -> PoseList:
     models = [p for p in places if any((p / name).is_file() for name in MODELS)]
     sequences = any(p.is_dir() or p.suffix == ".zip" for p in path.glob("seq-*"))
     lists = sorted(path.glob("seq-*.txt"))
-    found = [*models, *([path / "seq-*"] if sequences else []), *lists[:1]]
+    kapture = [p for p in (path, path / "sensors") if (p / TRAJECTORIES).is_file()]
+    found = [*models, *kapture, *([path / "seq-*"] if sequences else []), *lists[:1]]
     if len(found) > 1:
         raise InputError(f"{path}: holds poses twice, {found[0]} and {found[1]}; name one of them")
     if models:
         return read_colmap(models[0])
+    if kapture:
+        return read_kapture(kapture[0] / TRAJECTORIES)
     if sequences:
         return read_sevenscenes(path)
     if lists:
@@ -234,31 +276,6 @@ def read_sevenscenes(path: Path) -> PoseList:
         matrices[:, :3, 3],
         _quat_of_rotations(matrices),
         of_matrices=True,
-    )
-
-
-def read_colmap(path: Path) -> PoseList:
-    """Read a COLMAP model, as text or binary, but not both."""
-    import pycolmap
-
-    both = [name for name in MODELS if (path / name).is_file()]
-    if len(both) > 1:
-        raise InputError(f"{path}: holds images.txt and images.bin; leave one of them")
-    damage = (RuntimeError, ValueError, IndexError, KeyError, MemoryError)
-    with read_as(path, "a COLMAP model", *damage):
-        model = pycolmap.Reconstruction(path)
-        images = sorted(model.images.values(), key=lambda image: image.name)
-        poses = [image.cam_from_world() for image in images if image.has_pose]
-    if not poses:
-        raise InputError(f"{path}: this COLMAP model has no image with a pose")
-    names = tuple(image.name for image in images if image.has_pose)
-    return PoseList(
-        "a COLMAP model",
-        COLMAP,
-        names,
-        tuple(f"image {name}" for name in names),
-        np.array([pose.translation for pose in poses]),
-        np.roll(np.array([pose.rotation.quat for pose in poses]), 1, axis=1),
     )
 
 

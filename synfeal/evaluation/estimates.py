@@ -12,15 +12,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.dataset.pose_list import CONVENTIONS, Convention, PoseList
+from synfeal.dataset.pose_list import (
+    CONVENTIONS,
+    OPENGL,
+    Convention,
+    PoseList,
+    named_convention,
+)
 from synfeal.errors import InputError
+from synfeal.geometry.axes import DESCRIPTIONS
 from synfeal.geometry.poses import pose_error
 
 Array = NDArray[np.float64]
 
-FAR_BETTER = 5.0  # times, in both medians
-# Errors below these are a good reading whatever another would give.
-GOOD_M, GOOD_DEG = 0.05, 5.0
+FAR_BETTER = 5.0  # times, in both medians, or in that of angles where positions are the same
+GOOD_DEG = 5.0  # a good reading whatever another would give
 
 
 def checked_convention(
@@ -38,14 +44,21 @@ def checked_convention(
         InputError: another convention fits far better; it says which ``--convention`` to give.
     """
     taken = _medians(estimates, estimates.convention, rows, reference)
-    if taken[0] < GOOD_M or taken[1] < GOOD_DEG:
+    if taken[1] < GOOD_DEG:
         return
-    for name, convention in CONVENTIONS.items():
+    tried = [named_convention(OPENGL, estimates.convention), *CONVENTIONS.values()]
+    for convention in tried:
+        if estimates.of_matrices and convention.order != estimates.convention.order:
+            continue
         other = _medians(estimates, convention, rows, reference)
-        if all(FAR_BETTER * o < t for o, t in zip(other, taken, strict=True)):
+        same_place = other[0] <= taken[0] * (1 + 1e-9)
+        if FAR_BETTER * other[1] < taken[1] and (same_place or FAR_BETTER * other[0] < taken[0]):
+            is_opengl = convention == tried[0]
+            name = OPENGL if is_opengl else str(convention)
+            axes = f" (camera axes {DESCRIPTIONS['opengl']})" * is_opengl
             raise InputError(
                 f"{path}: read as {estimates.kind} ({estimates.convention}) it is"
-                f" {_text(taken)} off, as {name} {_text(other)}; say which with --convention"
+                f" {_text(taken)} off, as {name}{axes} {_text(other)}; say which with --convention"
             )
 
 

@@ -7,6 +7,7 @@ spelled), by times that are nearest to each other, as evo does, or line by line.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,21 @@ from synfeal.evaluation.frames import NAME, ScoredFrames
 Array = NDArray[np.float64]
 # Largest difference of two times of one frame: evo's default, ``t_max_diff``.
 MOST_APART_S = 0.01
+
+
+class Clock(NamedTuple):
+    """How times of estimates are compared with those of a reference.
+
+    Attributes:
+        most_apart_s: Largest difference of two times of one pair.
+        offset_s: What is added to the times of the estimates, evo's ``t_offset``.
+    """
+
+    most_apart_s: float = MOST_APART_S
+    offset_s: float = 0.0
+
+
+SAME_CLOCK = Clock()
 
 SAYS: dict[FrameKey, str] = {
     "name": "names of images",
@@ -47,6 +63,8 @@ def read_reference(path: Path) -> ScoredFrames:
     names = _keys(found)
     if found.frame_key == "name":
         _refuse_twice(path, found, names)
+    if found.frame_key == "time":
+        refuse_same_times(path, found)
     return ScoredFrames(
         split="reference",
         names=names,
@@ -79,19 +97,41 @@ def _refuse_twice(path: Path, found: PoseList, names: tuple[str, ...]) -> None:
         first[name] = place
 
 
+def refuse_same_times(path: Path, found: PoseList) -> None:
+    """Refuse two poses of one time: nothing says which of them is meant.
+
+    Raises:
+        InputError: There are two; the message names both lines.
+    """
+    first: dict[float, str] = {}
+    times_s = _seconds(found.names)
+    n_times = len(np.unique(times_s))
+    for time_s, name, place in zip(times_s.tolist(), found.names, found.places, strict=True):
+        if time_s in first:
+            raise InputError(
+                f"{path}: the time {name[:40]} has two poses, {first[time_s]} and {place}"
+                f" ({len(times_s)} poses at {n_times} times); are two runs in one file, or times"
+                " rounded? Give each run a file of its own, and times as they were measured"
+            )
+        first[time_s] = place
+
+
 def _sequences(names: tuple[str, ...]) -> NDArray[np.int64]:
     """Return the index (N,) of the folder that each name begins with; 0 where there is none."""
     folders = [name.rpartition("/")[0] for name in names]
     return np.unique(folders, return_inverse=True)[1].astype(np.int64)
 
 
-def match_reference(frames: ScoredFrames, estimates: PoseList, path: Path) -> NDArray[np.int64]:
+def match_reference(
+    frames: ScoredFrames, estimates: PoseList, path: Path, clock: Clock = SAME_CLOCK
+) -> NDArray[np.int64]:
     """Find the row (N,) of each frame's estimate; -1 where there is none.
 
     Args:
         frames: Frames of a reference.
         estimates: Poses to score.
         path: Their file, for messages.
+        clock: How times are compared.
 
     Raises:
         InputError: The two cannot be paired, a frame has two estimates, or none has one.
@@ -111,10 +151,20 @@ def match_reference(frames: ScoredFrames, estimates: PoseList, path: Path) -> ND
             )
         return np.arange(n_frames)
     if frames.frame_key == "time":
-        own_s, other_s = _seconds(frames.names), _seconds(estimates.names)
+        refuse_same_times(path, estimates)
+        own_s, other_s = _seconds(frames.names), _seconds(estimates.names) + clock.offset_s
         nearest = _nearest(other_s, own_s)
-        row = np.where(np.abs(other_s[nearest] - own_s) <= MOST_APART_S, nearest, -1)
-        what = f"within {MOST_APART_S:g} s of one of the reference ({frames.names[0]} s, ...)"
+        apart_s = other_s[nearest] - own_s
+        row = np.where(np.abs(apart_s) <= clock.most_apart_s, nearest, -1)
+        if len(own_s) == len(other_s):  # then they may well be the same ones in the same order
+            apart_s = np.sort(other_s) - np.sort(own_s)
+        middle_s = float(np.median(apart_s))
+        what = (
+            f"within {clock.most_apart_s:g} s of one of the reference ({frames.names[0]} s, ...);"
+            f" they are {middle_s:+.3g} s apart (median): give --offset"
+            f" {-middle_s + clock.offset_s:.3g} if the two clocks differ, or a larger"
+            " --max-difference"
+        )
     else:
         keys = _keys(estimates)
         _refuse_twice(path, estimates, keys)
@@ -127,7 +177,7 @@ def match_reference(frames: ScoredFrames, estimates: PoseList, path: Path) -> ND
 
 
 def met_in_time(
-    frames: ScoredFrames, estimates: PoseList, path: Path
+    frames: ScoredFrames, estimates: PoseList, path: Path, clock: Clock = SAME_CLOCK
 ) -> tuple[ScoredFrames, NDArray[np.int64]]:
     """Leave out the frames at whose times nothing was estimated.
 
@@ -138,6 +188,7 @@ def met_in_time(
         frames: Frames of a reference with times.
         estimates: Poses to score.
         path: Their file, for messages.
+        clock: How times are compared.
 
     Returns:
         The frames left, and the row of the estimate of each.
@@ -145,8 +196,9 @@ def met_in_time(
     Raises:
         InputError: The estimates have no times, or none near one of the reference.
     """
-    match_reference(frames, estimates, path)
-    chosen, row = pairs_in_time(_seconds(frames.names), _seconds(estimates.names))
+    match_reference(frames, estimates, path, clock)
+    estimate_s = _seconds(estimates.names) + clock.offset_s
+    chosen, row = pairs_in_time(_seconds(frames.names), estimate_s, clock.most_apart_s)
     return frames.at(chosen), row
 
 
@@ -155,22 +207,23 @@ def _seconds(names: tuple[str, ...]) -> Array:
 
 
 def pairs_in_time(
-    reference_s: Array, estimate_s: Array
+    reference_s: Array, estimate_s: Array, most_apart_s: float = MOST_APART_S
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pair each time of the shorter series with the nearest one of the longer, as evo does.
 
     Args:
         reference_s: Seconds (N,), in any order.
         estimate_s: Seconds (M,), in any order.
+        most_apart_s: Largest difference of a pair.
 
     Returns:
-        Indices (K,) of both series, of the pairs within :data:`MOST_APART_S`.
+        Indices (K,) of both series.
     """
     if len(estimate_s) > len(reference_s):
-        estimate, reference = pairs_in_time(estimate_s, reference_s)
+        estimate, reference = pairs_in_time(estimate_s, reference_s, most_apart_s)
         return reference, estimate
     nearest = _nearest(reference_s, estimate_s)
-    close = np.abs(reference_s[nearest] - estimate_s) <= MOST_APART_S
+    close = np.abs(reference_s[nearest] - estimate_s) <= most_apart_s
     return nearest[close], np.flatnonzero(close)
 
 

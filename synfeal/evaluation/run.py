@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.known_camera import camera_of_dataset
-from synfeal.dataset.pose_list import CONVENTIONS, Convention, PoseList
+from synfeal.dataset.pose_list import Convention, PoseList, named_convention
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.poses_in import FormatName, read_pose_list
 from synfeal.dataset.sequence_listing import DEPTH
@@ -21,7 +21,13 @@ from synfeal.evaluation.bootstrap import FEWEST_PATHS
 from synfeal.evaluation.estimates import checked_convention
 from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
-from synfeal.evaluation.reference import match_reference, met_in_time, read_reference
+from synfeal.evaluation.reference import (
+    MOST_APART_S,
+    Clock,
+    match_reference,
+    met_in_time,
+    read_reference,
+)
 from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
 from synfeal.geometry.limits import FARTHEST_M
 from synfeal.geometry.poses import quat_wxyz_of, umeyama_sim3
@@ -40,11 +46,16 @@ class Settings(NamedTuple):
 
     split: str = "test"  # ``test``, ``train`` or ``all``
     align: Align = "none"  # whether estimates are first moved onto the yardstick, as a whole
-    convention: str | None = None  # a key of ``CONVENTIONS``; None takes the format's and checks it
+    # a key of ``CONVENTIONS``, or ``opengl``; None takes the format's and checks it
+    convention: str | None = None
     rate_hz: float | None = None  # frames a second of time stamps; None is DEFAULT_RATE_HZ
     labels: Path | None = None  # poses of the same frames as a second yardstick
     camera: Path | None = None  # calibration file, for the DCRE
     file_format: FormatName | None = None  # of the poses; None tells it by what the file holds
+    # between two files with times: largest difference of those of one pair, and what is added to
+    # the times of the estimates
+    most_apart_s: float = MOST_APART_S
+    offset_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -81,11 +92,18 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     """
     if settings.rate_hz is not None and not 0 < settings.rate_hz < np.inf:
         raise InputError(f"--rate: must be above 0 frames a second, found {settings.rate_hz:g}")
+    if not 0 < settings.most_apart_s < np.inf:
+        raise InputError(
+            f"--max-difference: must be above 0 seconds, found {settings.most_apart_s:g}"
+        )
+    if not np.isfinite(settings.offset_s):
+        raise InputError(f"--offset: must be finite, found {settings.offset_s:g}")
     frames = _scored(dataset, settings)
     estimates = read_pose_list(poses, settings.file_format)
     _refuse_useless(dataset, poses, frames, estimates, settings)
     if frames.frame_key == "time":
-        frames, row = met_in_time(frames, estimates, poses)
+        clock = Clock(settings.most_apart_s, settings.offset_s)
+        frames, row = met_in_time(frames, estimates, poses, clock)
     else:
         row = _matched(frames, estimates, poses, settings)
     convention, predicted = _taken(poses, frames, estimates, row, settings, settings.convention)
@@ -117,8 +135,18 @@ def _refuse_useless(
             raise InputError(f"--rate: {dataset} is a file of poses, not of frames; leave it out")
         if estimates.frame_key != "time" and settings.labels is None:
             raise InputError(f"--rate: {path} is {estimates.kind}, without times; leave it out")
+    if frames.frame_key != "time":
+        for option, given in (
+            ("--max-difference", settings.most_apart_s != MOST_APART_S),
+            ("--offset", settings.offset_s != 0.0),
+        ):
+            if given:
+                raise InputError(
+                    f"{option}: is between the times of two files, and {dataset} has none; leave"
+                    " it out"
+                )
     order = estimates.convention.order
-    asked = CONVENTIONS[settings.convention].order if settings.convention else order
+    asked = named_convention(settings.convention, estimates.convention).order
     if estimates.of_matrices and asked != order:
         raise InputError(
             f"--convention: {path} is {estimates.kind}, of matrices, which have no order of"
@@ -183,7 +211,7 @@ def _taken(
     there = row >= 0
     if not convention and settings.align == "none":
         checked_convention(path, estimates, row[there], frames.world_from_cam[there])
-    taken = CONVENTIONS[convention] if convention else estimates.convention
+    taken = named_convention(convention, estimates.convention)
     poses = estimates.world_from_cam(taken)[row]
     poses[~there] = np.nan
     return taken, poses

@@ -18,7 +18,6 @@ from synfeal.evaluation.metrics import (
     cumulative,
     joint_error,
 )
-from synfeal.evaluation.reference import MOST_APART_S
 from synfeal.evaluation.reprojection import DCRE_BOUNDS
 from synfeal.evaluation.run import Evaluation, Settings
 from synfeal.records.files import atomic_path
@@ -87,13 +86,15 @@ def _findings(poses: Path, settings: Settings, found: Evaluation) -> list[str]:
     n_frames, there = len(found.frames.names), found.row >= 0
     lines = [
         f"{poses}: {found.estimates.kind}, {len(found.estimates.names)} poses, taken as"
-        f" {found.convention.direction} with quaternions {found.convention.order}",
+        f" {found.convention.direction} with quaternions {found.convention.order}"
+        + f" and camera axes of {found.convention.axes}"
+        * (found.convention.axes != "opencv"),
         f"{found.frames.title}: {n_frames} frames, {int(there.sum())} of them with a pose",
     ]
     if found.frames.n_left_out:
         lines.append(
             f"{found.frames.n_left_out} poses of the reference have no estimate within"
-            f" {MOST_APART_S:g} s and are left out"
+            f" {settings.most_apart_s:g} s and are left out"
         )
     names = np.array(found.frames.names)
     lines += _some("without a pose, which counts as a failure", names[~there])

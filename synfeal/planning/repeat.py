@@ -14,9 +14,12 @@ from synfeal.dataset.poses_in import read_trajectory
 from synfeal.dataset.sequence_listing import POSE, list_sequence
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_pose, read_split
 from synfeal.errors import InputError
+from synfeal.geometry.axes import DESCRIPTIONS
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.geometry.rigid import refuse_non_rigid
-from synfeal.geometry.rotations import canonical_quat_wxyz
+from synfeal.geometry.rotations import canonical_quat_wxyz, matrix_from_quat_wxyz
+
+MOSTLY = 0.9  # of the cameras
 
 log = logging.getLogger("synfeal")
 
@@ -41,6 +44,7 @@ def repeated_poses(
     if len(table) < n_frames:
         raise InputError(f"{source}: holds {len(table)} {split} poses; {n_frames} are asked for")
     table = table.first(n_frames)
+    _warn_of_heads(source, table)
     lower, upper = mesh_bounds_m
     inside = ((table.position_m >= lower) & (table.position_m <= upper)).all(axis=1)
     if not inside.all():
@@ -53,6 +57,20 @@ def repeated_poses(
             where,
         )
     return table
+
+
+def _warn_of_heads(source: Path, table: PoseTable) -> None:
+    """Warn where nearly all cameras stand on their heads, as OpenGL's do if taken as ours."""
+    upside_down = matrix_from_quat_wxyz(table.quat_wxyz)[:, 2, 1] > 0  # y of the camera, down
+    if np.mean(upside_down) >= MOSTLY:
+        log.warning(
+            "%s: %d of %d cameras stand on their heads; if their axes are %s, multiply each pose by"
+            " diag(1, -1, -1, 1) from the right",
+            source,
+            np.sum(upside_down),
+            len(table),
+            DESCRIPTIONS["opengl"],
+        )
 
 
 def read_poses(source: Path, split: str) -> PoseTable:
