@@ -53,13 +53,8 @@ archive: $(INSTALLED)  ## PROFILE's report, figures, and all that its tables are
 	  $(addprefix $(PROFILE)/,benchmarks tables figures labels estimates runs references scenes)
 	@echo build/results-$(PROFILE).tar.gz
 
-plan: smoke  ## what paper costs, and what such plans are worth (results/benchmarks)
+plan: smoke  ## what plans are worth: predictions beside measured runs (results/benchmarks)
 	mkdir -p results/benchmarks/smoke && cp results/smoke/benchmarks.csv results/benchmarks/smoke/
-	$(BIN)/synfeal plan --profile paper --cores 16 64 --csv results/benchmarks/plan_paper.csv
-	for run in night labels dose controls tracking transfer curves scratch sanctuary \
-	    better_labels more_sanctuary shapes maps sanctuary_labels; do \
-	  $(BIN)/synfeal plan --profile config/$$run.yaml --cores 2 \
-	    --csv results/benchmarks/plan_$$run.csv || exit 1; done
 	$(BIN)/synfeal plan --measured results/benchmarks/smoke results/published/night \
 	  --compare results/published/mini --csv results/benchmarks/plan_check.csv
 

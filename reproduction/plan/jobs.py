@@ -19,7 +19,7 @@ LABELS = ("true_labels", "erroneous_labels", "posegraph", "chain")
 OTHERS = ("pretrain", "varied_structure", "render_speed", "collection_speed", "table", "side_table")
 ALIKE = SCENE + LABELS + OTHERS
 # What jobs of a rule differ in beside their size.
-VARIANTS = ("frame_method", "graph_method", "effects", "table", "side", "model")
+VARIANTS = ("frame_method", "graph_method", "effects", "table", "model")
 
 
 def jobs_of(files: Files) -> pd.DataFrame:

@@ -45,6 +45,17 @@ def plan_text(
     return "\n".join(_text(files, costs, measured) for costs in plans)
 
 
+def planned_cpu_s(profile: str, measured: Sequence[Path]) -> pd.Series[float]:
+    """Predict the processor seconds of a run, by rule.
+
+    Args:
+        profile: Its profile's name, or its file.
+        measured: Results of the runs it is predicted from.
+    """
+    rows = _by_rule(read_profile(profile), paces_of(map(read_run, measured)), cores=1)
+    return rows.set_index("name")["cpu_s"]
+
+
 def compare_text(measured: Sequence[Path], compared: Path, csv: Path | None = None) -> str:
     """Predict a measured run from each of others, and each of those from it.
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,16 +19,16 @@ import pandas as pd
 
 from reproduction.claims.rules import frozen_rules
 from reproduction.claims.verdicts import GROUPS, MEANINGS, Claim, Verdict, published_claims
-from reproduction.report.publish import PUBLISHED, RESULTS
+from reproduction.plan.plan import planned_cpu_s
+from reproduction.report.publish import PUBLISHED
 from reproduction.report.published_claims import published_runs, read_published, rules_of
 from reproduction.runs.results import read_result
 from reproduction.tables.sheet import markdown_table
-from synfeal.errors import InputError
-from synfeal.records.tables import MAYBE, TEXT, read_frame
 
 # All runs that were published before the rules were frozen, or that chose a setting, had this seed.
 SEEN_SEED = "0"
-BENCHMARKS = RESULTS / "benchmarks"
+# Runs that others are planned from.
+PLANNED_FROM = (PUBLISHED / "mini", PUBLISHED / "night")
 # No chance enters the claims about the set-up, and C9 is not judged (docs/rules.md).
 NOT_DRAWN = ("C9",)
 # Of these it was announced, before their last run, that no other would follow under the same rules.
@@ -265,9 +266,10 @@ def _open(judged: Mapping[str, Sequence[Judged]]) -> str:
         ]
         own = [f for name in left for f in judged.get(name, ()) if f.profile == run.profile]
         if trained := [found.claim.id for found in own if found.row["seeds"]]:
+            hours = planned_hours(run.profile, "train")
             items.append(
                 f"- {', '.join(trained)}: more training runs per cell of `{run.profile}`. As many"
-                f" again are planned at {planned_hours(run, 'train'):.1f} hours of processor time;"
+                f" again are planned at {hours:.1f} hours of processor time;"
                 " the part of the limits that training runs cause shrinks with the root of their"
                 " number."
             )
@@ -281,26 +283,18 @@ def _open(judged: Mapping[str, Sequence[Judged]]) -> str:
         if waiting := [name for name in left if name not in judged or run.profile not in made]:
             items.append(
                 f"- {', '.join(waiting)}: profile `{run.profile}`, planned at"
-                f" {planned_hours(run):.1f} hours of processor time"
-                f" ([plan](../results/benchmarks/plan_{run.profile}.csv))."
+                f" {planned_hours(run.profile):.1f} hours of processor time."
             )
     return "\n".join(["What would decide the others:", "", *items]) if items else ""
 
 
-def planned_hours(run: JudgingRun, row: str = "total", folder: Path = BENCHMARKS) -> float:
-    """Return the hours of processor time that a run is planned at.
+@cache
+def planned_hours(profile: str, rule: str | None = None) -> float:
+    """Return the hours of processor time that a run of a profile is planned at.
 
     Args:
-        run: The run.
-        row: Row of its plan: a rule, such as ``train``, or ``total``.
-        folder: Folder of the plans.
-
-    Raises:
-        InputError: It has not been planned.
+        profile: Its name.
+        rule: A rule, such as ``train``; None for the whole run.
     """
-    path = folder / f"plan_{run.profile}.csv"
-    costs = read_frame(path, {"name": TEXT, "cpu_s": MAYBE}, "make plan")
-    own = costs[costs.name == row]
-    if own.empty:
-        raise InputError(f"{path}: has no row {row!r}; make plan")
-    return float(own.cpu_s.iloc[0]) / 3600
+    seconds = planned_cpu_s(profile, PLANNED_FROM)
+    return float(seconds.sum() if rule is None else seconds[rule]) / 3600

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from reproduction.runs.renamed import job_with_present_name
+from reproduction.runs.renamed import with_present_names
 from synfeal.errors import InputError
 from synfeal.records.tables import MAYBE, NUMBER, TEXT, read_frame, write_frame
 
@@ -28,11 +28,10 @@ def read_measured(root: Path) -> pd.DataFrame:
     folder, table = root / "benchmarks", root / "benchmarks.csv"
     paths = sorted(folder.rglob("*.tsv"))
     if paths:
-        return read_jobs(paths, folder)
+        return with_present_names(read_jobs(paths, folder))
     if not table.is_file():
         raise InputError(f"{root}: holds no benchmarks/**/*.tsv and no benchmarks.csv; name a run")
-    jobs = read_frame(table, SCHEMA, "name another run")
-    return jobs.assign(job=jobs["job"].map(job_with_present_name))
+    return with_present_names(read_frame(table, SCHEMA, "name another run"))
 
 
 def read_jobs(paths: Iterable[Path], folder: Path) -> pd.DataFrame:
@@ -69,4 +68,4 @@ def _read_tsv(path: Path, folder: Path) -> tuple[str, str, float, float, float]:
     rows = read_frame(path, BENCHMARK, REMEDY, sep="\t")
     if rows.empty:
         raise InputError(f"{path}: has no rows; {REMEDY}")
-    return stage, job_with_present_name("/".join(rest)), *rows.iloc[-1]
+    return stage, "/".join(rest), *rows.iloc[-1]

@@ -9,12 +9,15 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import pandas as pd
+
 from synfeal.errors import InputError, exit_status
 
 # Trajectories of label methods lay in ``groundtruth``, and the camera of the frames that they see
 # was called so: both hold estimates, or serve to make them.
 OLD = "groundtruth"
 ESTIMATES, CAMERA = "estimates", "estimation"
+EFFECTS = "robustness"
 # Files and directories that are called by camera, below the results.
 BY_CAMERA = (f"datasets/*/{OLD}*", f"scenes/*/*_{OLD}.*")
 MEASURED_BY_CAMERA = (f"benchmarks/**/*{OLD}*", f"logs/**/*{OLD}*")
@@ -54,9 +57,20 @@ def rename_results(root: Path) -> int:
     return len(found)
 
 
-def job_with_present_name(job: str) -> str:
-    """Return a measured job, such as ``large_room/groundtruth/seq-01``, by its present names."""
-    return "/".join(part.replace(OLD, CAMERA) for part in job.split("/"))
+def with_present_names(jobs: pd.DataFrame) -> pd.DataFrame:
+    """Rename measured jobs as they are called now.
+
+    Args:
+        jobs: Their ``stage`` and ``job``, such as ``render`` and ``large_room/groundtruth/seq-01``.
+
+    Returns:
+        The same jobs. Effects were measured where their table was written, and are a stage since.
+    """
+    renamed = jobs.assign(job=jobs["job"].str.replace(OLD, CAMERA, regex=False))
+    if not (jobs["stage"] == EFFECTS).any():
+        measured = (jobs["stage"] == "tables") & (jobs["job"] == EFFECTS)
+        renamed.loc[measured, ["stage", "job"]] = EFFECTS, ""
+    return renamed
 
 
 def _old_names(root: Path, by_camera: Sequence[str]) -> Iterator[tuple[Path, Path]]:

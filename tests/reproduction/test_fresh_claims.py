@@ -4,13 +4,16 @@ import csv
 import shutil
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from reproduction.claims.rules import rules_history
 from reproduction.claims.verdicts import Verdict
 from reproduction.config.load import load_config
 from reproduction.design.experiments import read_design
+from reproduction.plan.plan import plan_text
 from reproduction.report.fresh import (
+    PLANNED_FROM,
     RUNS,
     claims_to_test,
     fresh_answer,
@@ -20,12 +23,10 @@ from reproduction.report.fresh import (
     planned_hours,
 )
 from reproduction.report.publish import PUBLISHED
-from synfeal.errors import InputError
 from tests import CONFIG
 
 REPOSITORY = Path(__file__).parents[2]
 MINI = REPOSITORY / "results/published/mini"
-BENCHMARKS = REPOSITORY / "results/benchmarks"
 STARTS = ("pretrained", "scratch")
 
 
@@ -149,13 +150,11 @@ def test_what_is_trained_asks_for_more_runs_and_what_is_counted_for_more_batches
     open_ones = [(name, "verdict_true", str(Verdict.UNDECIDED)) for name in ("C1", "C4")]
     changes = [*open_ones, ("C1", "seeds", "3"), ("C4", "seeds", "")]
     publish_copy(tmp_path, "labels", changes, seed="1")
-    with (BENCHMARKS / "plan_labels.csv").open(newline="") as file:
-        train = next(row for row in csv.DictReader(file) if row["name"] == "train")
     left = fresh_claims(tmp_path).split("What would decide the others")[1].splitlines()
     (runs,) = (line for line in left if "more training runs per cell of `labels`" in line)
     assert "C1" in runs
     assert "C4" not in runs
-    assert f"{float(train['cpu_s']) / 3600:.1f} hours" in runs
+    assert f"{planned_hours('labels', 'train'):.1f} hours" in runs
     assert "- C4: more batches than `labels` has." in left
 
 
@@ -218,16 +217,11 @@ def test_each_open_claim_has_a_run_with_the_rows_it_is_judged_by():
             assert JUDGED_BY.get(claim, set()) <= cells, (run.profile, claim)
 
 
-def test_hours_are_those_of_the_tracked_plans(tmp_path):
-    with (BENCHMARKS / "plan_controls.csv").open(newline="") as file:
-        total = next(row for row in csv.DictReader(file) if row["name"] == "total")
-    (controls,) = (run for run in RUNS if run.profile == "controls")
-    assert planned_hours(controls, folder=BENCHMARKS) == pytest.approx(float(total["cpu_s"]) / 3600)
-    with pytest.raises(InputError, match="plan_controls"):
-        planned_hours(controls, folder=tmp_path)
-    (tmp_path / "plan_controls.csv").write_text("name,cpu_s\nscene,1\n")
-    with pytest.raises(InputError, match="make plan"):
-        planned_hours(controls, folder=tmp_path)
+def test_hours_are_those_of_a_plan_from_the_published_runs(tmp_path):
+    plan_text("labels", PLANNED_FROM, [2], tmp_path / "plan.csv")
+    costs = pd.read_csv(tmp_path / "plan.csv").set_index("name").cpu_s
+    assert planned_hours("labels") == pytest.approx(costs["total"] / 3600, rel=1e-3)
+    assert planned_hours("labels", "train") == pytest.approx(costs["train"] / 3600, rel=1e-3)
 
 
 def test_published_runs_are_read_where_pages_are_made(monkeypatch):

@@ -8,15 +8,12 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reproduction.figures.registry import write_figures
-from reproduction.tables.speed_vs_error import speeds_of
 from synfeal.collection.collision import (
     Rung,
     collision_mesh,
     ladder,
     last_agreeing,
     search,
-    write_curve,
 )
 from synfeal.errors import InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
@@ -29,9 +26,7 @@ from synfeal.mesh.triangles import (
     simplify,
 )
 from synfeal.planning.space import draw_questions
-from synfeal.records.tables import write_frame
 from tests.support.empty_room import ROOM, SCENE
-from tests.support.report_results import design_of, read
 
 N_QUESTIONS = 4000
 BOX = np.array([[-2.8, -1.8, 0.8], [2.8, 1.8, 1.8]])
@@ -185,24 +180,3 @@ def test_faults_of_the_program_are_no_damaged_collision_mesh(broken, tmp_path, m
     monkeypatch.setattr("pathlib.Path.read_bytes", fail)
     with pytest.raises(broken, match="of ours"):
         load_collision_mesh(tmp_path / "collision.ply")
-
-
-def test_the_table_rids_speeds_of_what_else_the_machine_did(tmp_path):
-    # The second pair was measured while the machine did half its work elsewhere.
-    full = replace(RUNG, faces=4000, rays_per_s=100, full_rays_per_s=100)
-    slow = replace(RUNG, faces=800, agreement=0.998, rays_per_s=75, full_rays_per_s=50, chosen=1)
-    few = replace(RUNG, agreement=0.9, rays_per_s=200, full_rays_per_s=100)
-    write_curve(tmp_path / "scenes" / "large_room" / "collision_curve.csv", [full, slow, few])
-    table = tmp_path / "tables" / "speed_vs_error.csv"
-    write_frame(table, speeds_of("collision", ["large_room"], tmp_path))
-    rows = read(table)
-    assert [row["variant"] for row in rows] == ["full", "decimated", "decimated"]
-    assert [float(row["items_per_s"]) for row in rows] == [100.0, 150.0, 200.0]
-    assert [float(row["error"]) for row in rows] == pytest.approx([0.0, 0.002, 0.1])
-    assert [row["chosen"] for row in rows] == ["0", "1", "0"]
-    assert {(row["stage"], row["scene"]) for row in rows} == {("collision", "large_room")}
-    write_figures(design_of(()), tmp_path, tmp_path / "figures")
-    drawn = {path.name for path in (tmp_path / "figures").iterdir()}
-    assert drawn == {f"speed_vs_error_collision.{end}" for end in ("png", "svg")}
-    with pytest.raises(InputError, match=r"sanctuary/collision_curve\.csv"):
-        speeds_of("collision", ["sanctuary"], tmp_path)

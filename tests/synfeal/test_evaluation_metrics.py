@@ -1,19 +1,13 @@
 """Recalls, means and reprojection errors with known answers, and beside second implementations."""
 
-import json
-
 import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from baselines.training.score import score_run
-from reproduction.tables.recall import COLUMNS, SCHEMA, recall_table
-from reproduction.tables.side import write_side_table
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.pose_table import write_pose_table
 from synfeal.errors import InputError
-from synfeal.evaluation.metrics import BOUNDS, Bound, joint_error, pose_errors, summary, within
+from synfeal.evaluation.metrics import BOUNDS, joint_error, summary, within
 from synfeal.evaluation.reprojection import (
     CELLS,
     cell_depth_m,
@@ -25,9 +19,7 @@ from synfeal.evaluation.reprojection import (
 )
 from synfeal.geometry.poses import pose_matrix
 from synfeal.mesh.rays import RayCaster
-from synfeal.records.tables import read_frame
 from tests.support.property_support import table_of
-from tests.support.report_results import design_of, experiment
 
 CAMERA = CameraConfig(width=128, height=96, horizontal_fov_deg=60.0)
 LENS = CAMERA.model_copy(update={"distortion": (0.1, -0.05, 0.001, -0.002, 0.01)})
@@ -141,32 +133,3 @@ def test_dcre_summary_leaves_out_frames_that_show_nothing():
     assert found["dcre_below_0.05_true"] == pytest.approx(2 / 5)
     assert found["dcre_below_0.15_true"] == pytest.approx(3 / 5)
     assert dcre_summary(np.full(3, np.nan), np.arange(3)) == {}
-
-
-def test_a_run_is_scored_by_the_same_module_and_becomes_a_row(tmp_path):
-    truth = random_poses(40, 1.0, 180.0, seed=5)
-    predicted = table_of(truth @ random_poses(40, 0.1, 3.0, seed=6))
-    design = design_of([experiment("table4_size")])
-    write_pose_table(tmp_path / "truth.csv", table_of(truth))
-    write_cell_depth(tmp_path / "depth.npy", np.full((40, CELLS[0] * CELLS[1]), 2.0))
-    for run in design.runs:
-        folder = tmp_path / "runs" / run.directory
-        write_pose_table(folder / "predictions.csv", predicted)
-        files = (folder / "predictions.csv", *[tmp_path / "truth.csv"] * 3)
-        outputs = (folder / "errors.csv", folder / "metrics.json")
-        score_run(*files, *outputs, {}, (tmp_path / "depth.npy", CAMERA))
-    metrics = json.loads((folder / "metrics.json").read_text())
-    errors = pose_errors(predicted, table_of(truth))
-    assert metrics["recall_10cm_5deg_true"] == within(errors, Bound(0.10, 5)).mean() > 0
-    depth_m = read_cell_depth(tmp_path / "depth.npy", 40)
-    expected = np.median(dcre(predicted, table_of(truth), depth_m, CAMERA))
-    assert metrics["dcre"] == metrics["dcre_true"] == pytest.approx(expected)
-    write_side_table(
-        "recall", design, {}, tmp_path, tmp_path / "recall.csv", tmp_path / "recall.tex"
-    )
-    table = read_frame(tmp_path / "recall.csv", SCHEMA)
-    assert len(table) == 5
-    for column in COLUMNS:
-        assert table[column].iloc[0] == pytest.approx(metrics[column], rel=1e-5)
-    assert r"5 cm, 5$^\circ$" in (tmp_path / "recall.tex").read_text()
-    assert recall_table(design, tmp_path).shape == table.shape

@@ -18,7 +18,6 @@ from baselines.labels.injected import (
     write_erroneous_labels,
 )
 from baselines.labels.label_error import absolute_errors, share_within
-from reproduction.design.experiments import INJECTED
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.geometry.poses import pose_error, position_error_m
 from tests import ROOT
@@ -82,7 +81,7 @@ def erroneous(kind, table, train, noise_m=0.3, noise_deg=20.0, seed=1):
     return with_error(kind, table, train, noise_m, noise_deg, np.random.default_rng(seed))
 
 
-@pytest.mark.parametrize("kind", INJECTED)
+@pytest.mark.parametrize("kind", LABEL_ERRORS)
 @pytest.mark.parametrize(("noise_m", "noise_deg"), SIZES)
 def test_every_kind_has_the_same_median_error_on_the_training_poses(kind, noise_m, noise_deg):
     train = random_table(501, 0, 7)
@@ -140,7 +139,7 @@ def test_a_bend_belongs_to_space_and_is_smooth():
 
 
 def test_errors_of_space_are_seeded_alike_and_what_stands_still_is_not_scaled():
-    alike = [kind for kind in INJECTED if seed_names(kind, "train") == seed_names(kind, "test")]
+    alike = [kind for kind in LABEL_ERRORS if seed_names(kind, "train") == seed_names(kind, "test")]
     assert sorted(alike) == ["bend", "scale"]
     assert [name for name, kind in LABEL_ERRORS.items() if not kind.turns] == ["scale"]
     table = replace(random_table(3, 0, 7), position_m=np.ones((3, 3)))
@@ -211,7 +210,7 @@ def test_the_design_has_the_drift_that_real_label_sets_differ_by():
         assert middle[both].min() < ours < middle[both].max()
 
 
-@pytest.mark.parametrize("kind", INJECTED)
+@pytest.mark.parametrize("kind", LABEL_ERRORS)
 def test_two_sizes_of_a_kind_differ_in_size_alone(kind):
     train = random_table(201, 0, 7)
     small, large = (noise_of(train, erroneous(kind, train, train, *size)) for size in SIZES)
@@ -220,7 +219,7 @@ def test_two_sizes_of_a_kind_differ_in_size_alone(kind):
         np.testing.assert_allclose(4 * small[1], large[1], atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", INJECTED)
+@pytest.mark.parametrize("kind", LABEL_ERRORS)
 def test_the_published_codes_dose_is_longer_by_the_root_of_three(kind, tmp_path):
     train = random_table(201, 0, 7)
     write_pose_table(tmp_path / "true.csv", train)
