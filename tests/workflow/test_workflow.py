@@ -39,7 +39,7 @@ def test_default_profile_plans_the_papers_tables(tmp_path):
     assert jobs["image_references"] == 20
     assert jobs["structure_references"] == 5  # true poses, SfM's, largest noise of three blocks
     assert jobs["table"] == 4
-    assert jobs["side_table"] == 9  # neither shapes of errors nor robustness
+    assert jobs["side_table"] == 8  # neither shapes of errors nor robustness
     assert not jobs.keys() & {"adjusted_references", "coordinate_references", "train_varied"}
 
 
