@@ -23,10 +23,10 @@ from baselines.references.redrawn import Redrawn, read_redrawn
 from baselines.training.localize import find_pictures, open_picture
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, SUPPORT
-from synfeal.dataset.render_sequence import Progress
 from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import writing_to
+from synfeal.records.progress import Progress
 from synfeal.records.tables import write_frame
 
 Array = NDArray[np.float64]

@@ -35,7 +35,6 @@ from synfeal.config.types import Strict
 from synfeal.dataset.depth_agreement import check_depth
 from synfeal.dataset.packed import fit_frame
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
-from synfeal.dataset.render_sequence import Progress
 from synfeal.dataset.world import KEY, rigid_motion_of
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import quat_wxyz_of
@@ -48,6 +47,7 @@ from synfeal.records.files import (
     write_json,
     writing_to,
 )
+from synfeal.records.progress import Progress
 from synfeal.records.provenance import provenance
 from synfeal.records.tables import read_records
 

@@ -28,10 +28,10 @@ from synfeal.camera.photograph import PhotographCamera, Source
 from synfeal.dataset.images import read_image, upright
 from synfeal.dataset.packed import NetworkView, fit_frame
 from synfeal.dataset.pose_table import COLUMNS, SEEN
-from synfeal.dataset.render_sequence import Progress
 from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 from synfeal.records.files import writing_to
+from synfeal.records.progress import Progress
 from synfeal.records.tables import write_frame
 
 Array = NDArray[np.float64]

@@ -34,12 +34,12 @@ from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.packed import fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
-from synfeal.dataset.render_sequence import Progress
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
 from synfeal.dataset.world import read_sequence_from_world
 from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import file_sha256, read_json, write_json
+from synfeal.records.progress import Progress
 from synfeal.scanning.camera import TUM_UNITS_PER_M, RgbdCamera, posed_depth
 
 log = logging.getLogger(__name__)

@@ -36,13 +36,13 @@ from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.packed import fit_frame
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.posed_sequence import PosedFrames, read_posed_sequence
-from synfeal.dataset.render_sequence import Progress
 from synfeal.dataset.sevenscenes import SPLIT_FILES, frame_paths, read_split
 from synfeal.dataset.world import WORLD, read_scan_record, rigid_motion_of
 from synfeal.geometry.poses import inverse, quat_wxyz_of
 from synfeal.mesh.load import load_mesh
 from synfeal.planning.like import resized
 from synfeal.records.files import atomic_directory, read_json, write_json, write_text
+from synfeal.records.progress import Progress
 from synfeal.records.tables import write_numbers
 from synfeal.render.choose import open_renderer
 from synfeal.scanning.picture import compare, write_picture

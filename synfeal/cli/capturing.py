@@ -38,7 +38,7 @@ def unpack(arguments: argparse.Namespace) -> None:
     capture = read_capture(arguments.capture, arguments.format)
     title = capture_formats()[capture.format].title
     print(f"{arguments.capture}: {len(capture)} frames of {title}")
-    with Progress(-(-len(capture) // arguments.every), "frame", "unpacked") as progress:
+    with Progress(-(-len(capture) // arguments.every), "unpacked") as progress:
         done = write(capture, arguments.out, stride=arguments.every, on_frame=progress.update)
     for note in done.notes:
         log.warning("%s: %s", arguments.capture, note)

@@ -29,7 +29,7 @@ from synfeal.dataset.layer_files import refuse_many_instances
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.render_pool import Studio, render_sequences
-from synfeal.dataset.render_sequence import Progress, resolved
+from synfeal.dataset.render_sequence import resolved
 from synfeal.dataset.sevenscenes import Split, sequences_of
 from synfeal.dataset.world import read_scan_record, rigid_motion_of, write_sequence_from_world
 from synfeal.effects.scene import crowd_of
@@ -43,6 +43,7 @@ from synfeal.mesh.triangles import load_collision_mesh
 from synfeal.planning.coverage import empty_pixels, scene_coverage
 from synfeal.planning.plan import plan_mesh
 from synfeal.records.files import write_json
+from synfeal.records.progress import Progress
 from synfeal.records.provenance import generator_of
 from synfeal.render.surface import Layers
 

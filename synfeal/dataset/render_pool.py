@@ -18,9 +18,10 @@ from typing import Any
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.pose_table import PoseTable
-from synfeal.dataset.render_sequence import Progress, effects_of, write_sequence
+from synfeal.dataset.render_sequence import effects_of, write_sequence
 from synfeal.effects.scene import SceneRenderer, open_scene
 from synfeal.errors import InputError
+from synfeal.records.progress import Progress
 from synfeal.render.surface import Layers
 
 POLL_S = 0.2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
 import time
 from collections import deque
@@ -15,7 +14,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from tqdm import tqdm
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
@@ -44,29 +42,9 @@ from synfeal.records.files import (
     write_json,
     writing_to,
 )
+from synfeal.records.progress import Progress
 from synfeal.render.choose import fastest_working, graphics
 from synfeal.render.surface import Layers
-
-
-class Progress(tqdm):  # type: ignore[type-arg]
-    """Frames done of all that are to be rendered: a bar on a terminal, or one line per sequence."""
-
-    def __init__(self, n_frames: int, name: str, n_done: int = 0) -> None:
-        super().__init__(total=n_frames, initial=n_done, unit="frame", desc=name, disable=None)
-
-    def part_done(self, name: str, n_frames: int, seconds: float) -> None:
-        """Print a line about a finished sequence where there is no terminal for the bar.
-
-        Args:
-            name: The sequence, such as ``seq-01``.
-            n_frames: Frames that were rendered.
-            seconds: Time that took.
-        """
-        if self.disable:
-            rate = n_frames / seconds if seconds else float("inf")
-            line = f"{name}, {n_frames} frames in {seconds:.1f} s, {rate:.1f}/s"
-            print(line, file=sys.stderr, flush=True)
-
 
 Effects = tuple[CameraConfig, EffectsConfig]
 REMEDY = "nothing was kept; fix that and render again"

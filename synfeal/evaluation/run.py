@@ -276,7 +276,7 @@ def _depth(frames: ScoredFrames, camera: CameraConfig) -> Array | None:
     if not all(path.is_file() for path in paths):
         return None
     found = []
-    with Progress(len(paths), "frame", "depth") as progress:
+    with Progress(len(paths), "depth") as progress:
         for depth_m in depth_of_images(paths, camera):
             found.append(depth_m)
             progress.update()

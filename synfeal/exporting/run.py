@@ -45,7 +45,7 @@ def export(dataset: Path, to: str, out: Path, copy: bool, camera_file: Path | No
     data = read_export_set(dataset, camera_file)
     with (
         atomic_directory(out) as directory,
-        Progress(len(data.frames), "frame", "export") as progress,
+        Progress(len(data.frames), "export") as progress,
     ):
 
         def place(source: FrameFile, target: Path | None) -> None:

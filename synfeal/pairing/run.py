@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from synfeal.dataset.depth_agreement import check_depth
 from synfeal.errors import InputError
@@ -26,6 +25,7 @@ from synfeal.records.files import (
     write_json,
     write_text,
 )
+from synfeal.records.progress import Progress
 from synfeal.records.tables import MAYBE_TEXT, NUMBER, TEXT, read_frame, rows_of, write_frame
 
 if TYPE_CHECKING:
@@ -194,13 +194,13 @@ def _table(
     """Tabulate the pairs that are kept with the indices of their frames; count those compared."""
     import pandas as pd  # takes time to load
 
-    with _progress(len(frames), "read", "frame") as progress:
+    with Progress(len(frames), "read") as progress:
         point_m = grid_points(
             frames.camera, frames.depth_m, frames.world_from_cam, job.grid, progress.update
         )
     n_directed = sum(len(group) * (len(group) - 1) for group in groups)
     parts = []
-    with _progress(n_directed, "compare", "pair") as progress:
+    with Progress(n_directed, "compare", unit="pair") as progress:
         for group in groups:
             overlap = _overlaps(job, frames, point_m, group, progress)
             first, second = np.triu_indices(len(group), 1)
@@ -225,7 +225,7 @@ def _overlaps(
     frames: DepthFrames,
     point_m: NDArray[np.float64],
     group: NDArray[np.int64],
-    progress: Any,
+    progress: Progress,
 ) -> NDArray[np.float32]:
     """Compute overlaps (G, G) in a group: row a, column b is the share of a that b sees."""
     overlap = np.ones((len(group), len(group)), np.float32)
@@ -248,7 +248,7 @@ def _write_flows(
 ) -> list[str]:
     """Write the flows of all pairs; their files, relative to the directory."""
     names = []
-    with _progress(len(table), "flow", "pair") as progress:
+    with Progress(len(table), "flow", unit="pair") as progress:
         for row in rows_of(table):
             ends = [frames.frames[index].name.replace("/", "-") for index in (row.a, row.b)]
             name = f"{FLOWS}/{ends[0]}_{ends[1]}.npz"
@@ -290,10 +290,3 @@ def _record(job: PairsJob, n_frames: int, compared: int, kept: int) -> dict[str,
             **asdict(job.choice),
         },
     }
-
-
-def _progress(total: int, name: str, unit: str) -> Any:
-    """Open a bar with rate and time left, on a terminal."""
-    return tqdm(
-        total=total, unit=unit, desc=name, leave=False, disable=None, unit_scale=total > 99_999
-    )

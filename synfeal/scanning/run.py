@@ -17,13 +17,13 @@ from synfeal.captures.unpack import known_up
 from synfeal.dataset.depth_agreement import DepthAgreement, best_focal_px, check_depth, spread
 from synfeal.dataset.images import image_size
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
-from synfeal.dataset.render_sequence import Progress
 from synfeal.errors import InputError
 from synfeal.geometry.axes import PosesAre, meant_poses
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from synfeal.records.files import write_json
+from synfeal.records.progress import Progress
 from synfeal.scanning.camera import (
     CameraOptions,
     RgbdCamera,

@@ -68,7 +68,7 @@ def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[
     size = None if camera is None or camera.assumed else camera.config
     poses, pose_failures = read_poses(sequences)
     n_layers = len({NORMAL, MASK} & set(kinds_of(sequences)))
-    with Progress((2 + n_layers) * n_frames, "frame", "validate") as progress:
+    with Progress((2 + n_layers) * n_frames, "validate") as progress:
         checks = [
             check_names(sequences),
             *check_images(sequences, size, progress.update),
@@ -116,7 +116,7 @@ def _stereo(
     frames = list(poses)
     step = 1 if every_pair else max(1, len(frames) // STEREO_PAIRS)
     chosen = frames[::step]
-    with Progress(len(chosen), "pair", "stereo") as progress:
+    with Progress(len(chosen), "stereo", unit="pair") as progress:
         return [check_stereo(chosen, poses, camera, progress.update)]
 
 
@@ -130,7 +130,7 @@ def _geometry(
     if not pairs:
         return [Check("pairs", "no two frames of a sequence to compare", skipped=True)]
     checks = [_convention(rigid, camera)] if camera.depth.projection is None else []
-    with Progress(len(pairs), "pair", "compare") as progress:
+    with Progress(len(pairs), "compare", unit="pair") as progress:
         return checks + check_consistency(pairs, rigid, camera, progress.update)
 
 

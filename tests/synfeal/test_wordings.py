@@ -83,13 +83,32 @@ def test_lines_of_progress_tell_rate_and_time_left(monkeypatch, capsys):
     now_s = 100.0
     monkeypatch.setattr(progress, "EVERY_S", 5.0)
     monkeypatch.setattr(progress.time, "monotonic", lambda: now_s)
-    with progress.Progress(40, "frame", "validate") as shown:
+    with progress.Progress(40, "validate") as shown:
         for _ in range(20):
             now_s += 0.5
             shown.update()
     assert capsys.readouterr().err.splitlines() == [
         "validate: 10 of 40 frames, 2.0/s, 15 s left",
         "validate: 20 of 40 frames, 2.0/s, 10 s left",
+    ]
+
+
+def test_a_finished_part_is_told_and_what_was_done_before_does_not_count_for_the_rate(
+    monkeypatch, capsys
+):
+    now_s = 100.0
+    monkeypatch.setattr(progress, "EVERY_S", 5.0)
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now_s)
+    with progress.Progress(40, "collect", 20) as shown:
+        now_s += 5.0
+        shown.update(10)
+        now_s += 2.5
+        shown.part_done("seq-02", 10, 4.0)
+        now_s += 2.5  # since the last line: not due yet
+        shown.update(10)
+    assert capsys.readouterr().err.splitlines() == [
+        "collect: 30 of 40 frames, 2.0/s, 5 s left",
+        "seq-02, 10 frames in 4.0 s, 2.5/s",
     ]
 
 
