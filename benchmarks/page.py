@@ -20,7 +20,7 @@ from synfeal.records.files import atomic_path
 
 COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 MARKERS = "os^DvP"
-LEGEND_INCHES = 7.0  # of four columns of settings
+LEGEND_INCHES = 7.0  # fits four columns of settings
 
 
 def write_page(out: Path, name: str, sweep: Sweep, rows: pd.DataFrame) -> None:

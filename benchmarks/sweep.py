@@ -227,7 +227,7 @@ def _measure(
                 new = pd.DataFrame([row])
                 write_frame(table, new if rows.empty else pd.concat([rows, new]), "%.5g")
         finally:
-            pool.shutdown(cancel_futures=True)  # of what is left after an error or Ctrl-C
+            pool.shutdown(cancel_futures=True)  # drops what is left after an error or Ctrl-C
 
 
 def _key(row: pd.Series | dict[str, str], keys: Sequence[str]) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from synfeal.render.surface import Layers
 
 CAMERA, RENDER = CameraConfig(width=320, height=240), RenderConfig(backend="opengl")
 SHOWN = (3, 10, 30, 47)  # paths of the test set, their second frame
-PATHS = (53, 118)  # of which four frames are shown, with objects of their own
+PATHS = (53, 118)  # four frames are shown from each, with its own objects
 TITLE_PX = 14
 
 

@@ -59,7 +59,7 @@ VIEW_PX = 64  # side of what retrieval sees of a frame, squeezed into a square
 # Most features of a frame, and their least contrast (OpenCV's default is 0.04): rendered surfaces
 # are smoother than photographs of them.
 MAX_FEATURES, CONTRAST = 1000, 0.006
-FEWEST_FEATURES = 100  # of a map; on fewer there is nothing to find a photograph by
+FEWEST_FEATURES = 100  # in a map; fewer cannot find a photograph
 REMEDY = "make the map again with synfeal map"
 
 

@@ -33,7 +33,7 @@ Rows = NDArray[np.int64]
 
 RETRIEVED = 20  # frames that a photograph is matched with, each time
 RATIO = 0.85
-MAX_ERROR_PX = 6.0  # of the map's frames; poses of a scan contradict each other by some pixels
+MAX_ERROR_PX = 6.0  # in the map's frames; poses of a scan contradict each other by some pixels
 # Matches that miss by this many times the largest error of an inlier may miss because the focal
 # length is wrong.
 FOCAL_ERRORS = 2.0

@@ -162,7 +162,7 @@ def answer_externally(
         found = files["poses"] if method["poses"] else None
         path = found or run_external(method["command"], files, named, folder)
     facts["answer_s"] = 0.0 if found else time.perf_counter() - begin  # another process worked
-    facts |= {"prepare_s": 0.0, "query_s": 0.0}  # of a command, both are in the above
+    facts |= {"prepare_s": 0.0, "query_s": 0.0}  # a command does both in the above
     poses = read_answers(path, read_pose_table(files["test"]))
     score_answers(poses, files, folder, wildcards, facts)
 

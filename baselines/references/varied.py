@@ -59,7 +59,7 @@ def write_varied(
     with open_scene(files["mesh"], camera, render) as renderer:
         places = tqdm(rows.tolist(), "drawing", unit="frame", mininterval=5)
         poses = (plan.between(row, row + 1) for row in places)
-        added = effects_of(camera, render)  # of each frame as a part of its path
+        added = effects_of(camera, render)  # a frame has those of its path
         views = (next(drawn(renderer, pose, Layers(), added)).rgb for pose in poses)
         greys = (np.asarray(Image.fromarray(rgb).convert("L")) for rgb in views)
         test = features_of(greys, None, camera, references)

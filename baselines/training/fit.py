@@ -58,7 +58,7 @@ PROTOCOLS: dict[Literal["corrected", "published"], Protocol] = {
 }
 # For photographs: ``corrected``, but the weights are averaged. Held-out renderings look like those
 # learned from, and do not tell which weights suit photographs.
-PHOTOGRAPHS = PROTOCOLS["corrected"]._replace(selection="averaged")
+FOR_PHOTOGRAPHS = PROTOCOLS["corrected"]._replace(selection="averaged")
 
 LAST_WEIGHTS = PROTOCOLS["corrected"]._replace(selection="last")
 NOT_KEPT = ResumeFile(None, "")

@@ -41,7 +41,7 @@ LEAST_MARGIN_M = 0.5
 # Pairs of virtual rotations: twice as many change errors by less than their seeds do.
 DEFAULT_TURNS = 8
 MOST_TURNS = 1000
-MOST_PIXELS = 2**27  # of a photograph: beyond what any camera takes
+MOST_PIXELS = 2**27  # more than any camera takes
 
 log = logging.getLogger(__name__)
 

@@ -46,7 +46,7 @@ class Muon(Untraced):
 
     def __init__(
         self,
-        params: Iterable[Tensor] | Iterable[dict[str, Any]],  # of two dimensions or more
+        params: Iterable[Tensor] | Iterable[dict[str, Any]],  # each has two dimensions or more
         lr: float = 1e-2,
         momentum: float = 0.95,
         weight_decay: float = 0.0,

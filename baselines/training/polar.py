@@ -58,7 +58,7 @@ def best_quintic(low: float, high: float) -> tuple[Quintic, float]:
     for _ in range(REMEZ_STEPS):
         powers = np.stack([nodes, nodes**3, nodes**5, signs], axis=1)
         linear, cubic, quintic, error = np.linalg.solve(powers, np.ones(4))
-        extrema = np.roots([5 * quintic, 3 * cubic, linear])  # of the derivative, in x^2
+        extrema = np.roots([5 * quintic, 3 * cubic, linear])  # zeros of the derivative, in x^2
         nodes = np.array([low, *np.sqrt(np.sort(extrema.real)), high])
     return Quintic(float(linear), float(cubic), float(quintic)), float(abs(error))
 

@@ -255,7 +255,7 @@ def _material(
     device = open_device(job.training.device)
     data = read_labelled_frames(frames, labels, job.network.input_px, device)
     learned, held_out = _split(job, data, test)
-    torch.manual_seed(job.seed)  # of the generator that dropout draws from, too
+    torch.manual_seed(job.seed)  # dropout draws from this generator, too
     localizer = build_localizer(job.name, job.network, job.hyper)
     if weights is not None:
         load_backbone_weights(localizer.backbone, weights)

@@ -19,7 +19,7 @@ from baselines.config.learning import (
 )
 from baselines.localizers.backbones.shipped import shipped_weights_path
 from baselines.localizers.registry import backbone_of
-from baselines.training.fit import PHOTOGRAPHS
+from baselines.training.fit import FOR_PHOTOGRAPHS
 from baselines.training.own_frames import (
     FrameRange,
     OwnFrames,
@@ -281,7 +281,7 @@ def _job_of(job: TrainJob, packed: PackedFrames) -> Job:
         training=training,
         samples_seen=job.images or BATCH,
         seed=job.seed,
-        exchanged=PHOTOGRAPHS,
+        exchanged=FOR_PHOTOGRAPHS,
     )
     if job.minutes is None:
         return run

@@ -183,7 +183,7 @@ STYLES: dict[str, Style] = {
     CLEAN: {"color": BLUE, "marker": "o", "markerfacecolor": "white"},
     MIXED: {"color": ORANGE, "marker": "D"},
 }
-OFFSET = 0.17  # of the marks of a line, in lines
+OFFSET = 0.17  # between marks on one line, in lines
 
 
 def draw_robustness(results: Results) -> Figure | None:

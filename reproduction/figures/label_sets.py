@@ -117,7 +117,7 @@ def draw_label_error(results: Results) -> Figure | None:
             axes.set_xlim(0, counts[column] - 1)
     for axes, label in zip(panels[:2, 0], UNITS, strict=True):
         axes.set_ylabel(label)
-        axes.set_ylim(bottom=0)  # of both splits, once all lines are drawn
+        axes.set_ylim(bottom=0)  # both splits share the limit, once all lines are drawn
     add_legend(figure, panels[0, 0], 3, MARKED)
     return figure
 

@@ -60,7 +60,8 @@ def evenly(count: int) -> list[int]:
 # Dust on a scanned floor and skirting are no furniture.
 ABOVE_FLOOR_M = 0.15
 GREY = "0.86"
-FLOOR_SHARE = 0.02  # of the surface lies below the floor's height: holes dig, a floor is large
+# Share of the surface that lies below the floor's height: holes dig, a floor is large.
+FLOOR_SHARE = 0.02
 
 
 @dataclass(frozen=True)

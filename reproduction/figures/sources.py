@@ -26,7 +26,7 @@ class Results:
     """A profile's results."""
 
     root: Path  # its directory
-    design: Design  # of the profile; what it leaves out is not drawn, whatever files there are
+    design: Design  # the profile's; what it leaves out is not drawn, whatever files there are
 
     @property
     def scenes(self) -> list[str]:

@@ -17,7 +17,7 @@ from synfeal.evaluation import bootstrap
 from synfeal.geometry import poses, rotations
 from synfeal.planning import path
 
-FRACTIONS = (0.0, 0.1, 0.5, 1.0)  # of the way between two rotations
+FRACTIONS = (0.0, 0.1, 0.5, 1.0)  # how far from one rotation to the other
 REFUSAL = "refusal"  # the quantity of cases without an answer: 0 when refused, else ``inf``
 DIGITS_50, RATIONAL = "mpmath, 50 digits", "exact rationals"
 BY_CONSTRUCTION = "by construction"

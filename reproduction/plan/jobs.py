@@ -84,7 +84,7 @@ def _frames(files: Files, rule: str, job: Mapping[str, str]) -> int:
         return len(files.sequence(job["scene"], job.get("camera", "network"), job["sequence"]))
     if "size" in job:
         return sum(config.n_frames(job["scene"], job["size"], split) for split in splits)
-    if rule == "plan":  # of all sizes: what it costs is no reason to have another plan
+    if rule == "plan":  # one plan covers all sizes
         return sum(config.n_largest(job["scene"], split) for split in splits)
     if "scene" in job:
         return sum(files.n_frames(job["scene"], "network", split) for split in splits)

@@ -39,7 +39,7 @@ from reproduction.tables.references import two_digits
 from synfeal.records.files import atomic_path
 
 DPI = 150
-SOURCE = "Source"  # of the picture: what it was drawn from
+SOURCE = "Source"  # key in the picture's metadata: what it was drawn from
 TRUTH = "against the truth"
 BOTH = "against truth = labels"
 TITLE_CHARACTERS = 84  # in a line

@@ -245,7 +245,7 @@ def rounded(points: Points, edges: Faces, faces: Faces) -> Points:
     mean = (neighbours @ points) / np.maximum(degree, 1)
     share = np.where(degree > 0, ROUNDING, 0.0)
     sides = faces_to_edges(faces)
-    rim = sides[group_rows(np.sort(sides, axis=1), require_count=1)]  # of one face only
+    rim = sides[group_rows(np.sort(sides, axis=1), require_count=1)]  # edges with one face only
     share[rim[rim[:, 0] != rim[:, 1]]] = 0
     return np.asarray(points + share * (mean - points), np.float64)
 

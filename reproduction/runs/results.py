@@ -14,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 from synfeal.errors import InputError, read_as, why
 from synfeal.records.files import read_json
 
-ADAPTER_OF = cache(TypeAdapter)  # of a model or type
+ADAPTER_OF = cache(TypeAdapter)  # by model or type
 
 
 def read_text(path: Path) -> str:

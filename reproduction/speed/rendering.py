@@ -26,7 +26,7 @@ from synfeal.records.timing import seconds_of
 from synfeal.render import choose, open_renderer
 from synfeal.render.base import SAMPLES_PER_AXIS, Depth, Renderer, Rgb, reference_images
 
-LARGEST_PX = 8192 // SAMPLES_PER_AXIS  # of a side, so that the reference is an image in OpenGL
+LARGEST_PX = 8192 // SAMPLES_PER_AXIS  # so that the reference fits an image in OpenGL
 SUPERSAMPLING = {"opengl": (1, 2, 3), "pyrender": (1, 2, 3), "raycast": (1, 2)}
 FACTORS = (2, 4)  # that textures are made smaller by, and triangles fewer
 ROUNDS = 2

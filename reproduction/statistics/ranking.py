@@ -24,8 +24,8 @@ class Agreement(NamedTuple):
     tau_low: float  # 95 % limits over test paths
     tau_high: float
     pairs: int  # that the truth orders
-    swapped: int  # of these, ordered the other way
-    tied: int  # of these, not told apart
+    swapped: int  # pairs that are ordered the other way
+    tied: int  # pairs that are not told apart
     reversed: int  # ordered one way by the truth, the other way otherwise, both beyond doubt
 
 

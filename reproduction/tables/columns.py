@@ -26,7 +26,7 @@ class Column:
     """A column of a side table."""
 
     title: str  # its heading
-    name: str = ""  # of the frame's column that it shows, and that a reader sorts by
+    name: str = ""  # the frame's column that it shows, and that a reader sorts by
     form: str = ""  # how its numbers are written, for :meth:`str.format`; empty for text
     factor: float = 1.0  # so many times the number is shown
     text: str = ""  # column of the frame that says how a number is written, in place of ``form``
@@ -54,7 +54,7 @@ class Column:
 class SideLayout:
     """A table beside tables 2 to 7, laid out."""
 
-    name: str  # of its files, without suffix
+    name: str  # its files are called so, without suffix
     caption: str  # what it shows, in a sentence or two
     columns: Sequence[Column]
     # A row per line. Two columns may say more than cells: ``style``, a class for a row of the page,
@@ -73,7 +73,7 @@ class Cell:
     paper: str = ""
     sort: Any = ""  # what the page sorts by; empty comes last
     bad: bool = False
-    style: str = ""  # of one of two scores: which
+    style: str = ""  # which of two scores it shows
 
 
 def cells_of(row: Mapping[str, Any], column: Column) -> list[Cell]:

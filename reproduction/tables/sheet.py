@@ -82,7 +82,7 @@ class Sheet:
 
     name: str  # file name without suffix; also the label references use
     caption: str  # one or two sentences
-    headings: tuple[str, ...]  # of the cells of a line
+    headings: tuple[str, ...]  # one for each cell of a line
     lines: Sequence[Line]
     remarks: tuple[str, ...] = ()  # sentences below the table that belong to no single cell
 

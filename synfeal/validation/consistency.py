@@ -1,6 +1,6 @@
 """Pairs of frames of one sequence compared by reprojection, and what they show of each frame.
 
-Bounds hold for rendered frames; ``tests/test_validate_right.py`` has faultless sets that pass.
+Bounds hold for rendered frames; ``tests/synfeal/test_validate.py`` has faultless sets that pass.
 """
 
 from __future__ import annotations

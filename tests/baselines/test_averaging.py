@@ -7,7 +7,7 @@ from torch import nn
 
 from baselines.training import resume
 from baselines.training.averaging import EVERY, LAST_SHARE, WeightAverage
-from baselines.training.fit import PHOTOGRAPHS, Fitting
+from baselines.training.fit import FOR_PHOTOGRAPHS, Fitting
 from tests.baselines.test_training_resume import assert_same
 from tests.support.colored_frames import train, write_split
 
@@ -66,7 +66,7 @@ def splits(tmp_path_factory):
 
 
 def run(split, folder):
-    return train(split, folder, samples=320, protocol=PHOTOGRAPHS)
+    return train(split, folder, samples=320, protocol=FOR_PHOTOGRAPHS)
 
 
 def test_averaging_is_part_of_what_a_stopped_run_goes_on_with(splits, tmp_path, monkeypatch):

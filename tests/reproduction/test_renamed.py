@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from reproduction.config.load import parse_config
-from reproduction.runs.renamed import refuse_old_names, rename_named
+from reproduction.runs.renamed import refuse_old_names, rename_named, with_present_names
 from synfeal.config.load import read_yaml
 from synfeal.errors import InputError
 from tests import CONFIG
@@ -59,3 +60,21 @@ def test_an_old_key_is_refused_with_its_present_name(key):
     new = key.replace("groundtruth", "estimation")
     with pytest.raises(InputError, match=f"^my.yaml: {key}: is called {new} now; rename the key"):
         parse_config(raw, "my.yaml")
+
+
+def test_jobs_of_an_old_run_are_read_by_their_present_names():
+    stages = ["render", "detail", "tables", "tables"]
+    jobs = ["attic/groundtruth/seq-01", "attic/detail_groundtruth", "robustness", "table4_size"]
+    old = pd.DataFrame({"stage": stages, "job": jobs, "cpu_s": [1.0, 2.0, 3.0, 4.0]})
+    read = with_present_names(old)
+    assert read.stage.tolist() == ["render", "detail", "robustness", "tables"]
+    assert read.job.tolist() == [
+        "attic/estimation/seq-01",
+        "attic/detail_estimation",
+        "",
+        "table4_size",
+    ]
+    assert read.cpu_s.tolist() == [1.0, 2.0, 3.0, 4.0]
+    # A run that measured effects by themselves keeps the job that lays out their table.
+    new = pd.concat([old, pd.DataFrame({"stage": ["robustness"], "job": [""], "cpu_s": [5.0]})])
+    assert with_present_names(new).stage.tolist().count("tables") == 2

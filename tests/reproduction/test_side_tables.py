@@ -33,7 +33,7 @@ PAGE = (ROOT / "docs/adding.md").read_text()
 
 def test_a_profile_makes_the_tables_that_it_has_files_for():
     assert set(made_side_tables(files_of({**ROW, "scene": "sanctuary"}))) == ALWAYS
-    estimated = files_of(ROW, SFM)  # of the data set that effects are tested on
+    estimated = files_of(ROW, SFM)  # on the data set that effects are tested on
     assert set(made_side_tables(estimated)) == ALWAYS | {
         "robustness",
         "assistance",
@@ -55,7 +55,7 @@ def test_needs_are_filled_in_every_combination_and_by_table():
     batches = [need for need in needs if "/estimates/" in need]
     assert len(batches) == 3 + 2  # 60 and 25 frames in batches of up to 21 that share one
     histories = [need for need in needs_of(files, "speed_vs_error") if "/history.csv" in need]
-    assert len(histories) == 5  # of Table 4 alone
+    assert len(histories) == 5  # Table 4 alone
     assert f"{files.root}/tables/label_error.csv" in needs_of(files, "speed_vs_error")
     assert not [n for n in needs_of(files_of(ROW), "speed_vs_error") if "label_error" in n]
 

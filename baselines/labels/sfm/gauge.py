@@ -28,7 +28,8 @@ GAUGE_FRAMES = 44
 MIN_DISTANCE_M = 0.05
 # Centres of cameras that stand closer together than this have no scale.
 MIN_SPREAD_M = 0.01
-ROUNDING = 1e-12  # of coordinates: what lies closer together than this share of them is one place
+# Places closer together than this share of their coordinates are one.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)

@@ -150,7 +150,7 @@ _LOCAL_STEPS, _LOCAL_TOLERANCE = 10, 1e-4
 _GLOBAL_STEPS, _GLOBAL_TOLERANCE = 20, 1e-6
 _GLOBAL_GROWTH = 1.3  # the global one is due when images or points have grown by this factor
 
-_MAX_MODELS = 5  # of one start, where the batch falls into pieces
+_MAX_MODELS = 5  # pieces that a batch may fall into, from one start
 
 
 def incremental_options(

@@ -33,9 +33,9 @@ class LogHandler(LogHandlerBase):
         """Before any event."""
         Handler.__init__(self)  # the interface of Snakemake 9.0 leaves that out
         self.view = RunView(Console(stderr=True, no_color=self.common_settings.nocolor or None))
-        self.planned: list[str] = []  # of a dry run: names of its jobs
+        self.planned: list[str] = []  # names of the jobs of a dry run
         self.counts: dict[str, int] = {}  # jobs that are to run, by rule
-        self.names: dict[int, str] = {}  # of jobs that began
+        self.names: dict[int, str] = {}  # by number, names of jobs that began
 
     def emit(self, record: LogRecord) -> None:
         """Called for one event after the other, in one thread."""
@@ -74,7 +74,7 @@ class LogHandler(LogHandlerBase):
                 self.view.failed(name, map(Path, fields["log"]))
             case LogEvent.RUN_INFO:
                 self.counts = {rule: n for rule, n in fields["stats"].items() if rule != "total"}
-            case _ if "expected_s" in fields:  # of the Snakefile's `onstart`
+            case _ if "expected_s" in fields:  # from the Snakefile's `onstart`
                 left = TimeLeft(self.counts, fields["expected_s"], fields["cores"])
                 self.view.begin(left)
             case _ if record.levelno >= WARNING or record.getMessage().startswith(SAID):
