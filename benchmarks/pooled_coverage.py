@@ -18,9 +18,9 @@ import pandas as pd
 from reproduction.statistics.pooled import pool
 from synfeal.records.tables import write_frame
 
-SHARES = (0.0, 0.25, 0.5, 0.75, 0.9, 1.0)
+SHARES = (0.0, 0.5, 0.9, 1.0)
 REPLICATIONS = (3, 5, 8)
-SIMULATED = 10_000
+SIMULATED = 4000
 
 
 def coverage(

@@ -50,15 +50,40 @@ def write_archive(root: Path, config: Config, out: Path) -> None:
     design = read_design(config)
     with atomic_directory(out, replace=True) as directory:
         errors = pd.concat(list(_errors_of(design, root)), ignore_index=True)
-        for key in KEYS:
-            errors[key] = errors[key].astype("category")
-        errors.to_parquet(directory / ERRORS, index=False, compression="zstd", compression_level=19)
+        write_errors(errors, directory / ERRORS)
         for name in (ASSISTANCE, LABEL_ERROR):
             (directory / name).write_text(read_text(root / "tables" / name), encoding="utf-8")
         jobs = read_measured(root).groupby("stage", sort=True)
         seconds = jobs[["wall_s", "cpu_s"]].sum().assign(jobs=jobs.size()).reset_index()
         write_frame(directory / SECONDS, seconds, "%.1f")
         write_json(directory / PROVENANCE, provenance(config.seed, config_hash(config)))
+
+
+def write_errors(errors: pd.DataFrame, path: Path) -> None:
+    """Write errors per frame; those against the truth are left empty where labels are exact."""
+    table = errors.copy()
+    for key in KEYS:
+        table[key] = table[key].astype("category")
+    for unit in UNITS:
+        true = table[f"true_{unit}"].astype("UInt16")
+        table[f"true_{unit}"] = true.where(table[unit] != table[f"true_{unit}"])
+    measured = [name for unit in UNITS for name in (unit, f"true_{unit}")]
+    table.to_parquet(
+        path,
+        index=False,
+        compression="zstd",
+        compression_level=19,
+        use_dictionary=[name for name in table.columns if name not in measured],
+        column_encoding=dict.fromkeys(measured, "BYTE_STREAM_SPLIT"),
+    )
+
+
+def read_archived(path: Path) -> pd.DataFrame:
+    """Read errors per frame, with those against the truth filled in where labels are exact."""
+    table = pd.read_parquet(path)
+    for unit in UNITS:
+        table[f"true_{unit}"] = table[f"true_{unit}"].fillna(table[unit]).astype(np.uint16)
+    return table
 
 
 def _errors_of(design: Design, root: Path) -> Iterator[pd.DataFrame]:

@@ -18,7 +18,15 @@ import pandas as pd
 
 from reproduction.claims.evidence import COMMON, QUANTITIES, Cell
 from reproduction.claims.training import LENGTHS, images_ratio
-from reproduction.replications.archive import ASSISTANCE, ERRORS, FAILED, KEYS, OWN, UNITS
+from reproduction.replications.archive import (
+    ASSISTANCE,
+    ERRORS,
+    FAILED,
+    KEYS,
+    OWN,
+    UNITS,
+    read_archived,
+)
 from reproduction.tables.cells import published_frame
 from synfeal.evaluation.bootstrap import Array, medians, path_counts
 from synfeal.records.provenance import generator_of
@@ -61,7 +69,7 @@ class Archive:
 
     @cached_property
     def _groups(self) -> dict[tuple[str, ...], pd.DataFrame]:
-        errors = pd.read_parquet(self.folder / ERRORS)
+        errors = read_archived(self.folder / ERRORS)
         return {
             tuple(map(str, key)): rows
             for key, rows in errors.groupby(list(KEYS), observed=True, sort=False)

@@ -1,13 +1,26 @@
 """Effects and verdicts of replications whose errors are known by construction."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from reproduction.claims.evidence import COMMON, Cell
-from reproduction.replications.archive import ASSISTANCE, ERRORS, FAILED, KEYS, OWN, UNITS
+from reproduction.config.load import load_config
+from reproduction.replications.archive import (
+    ASSISTANCE,
+    ERRORS,
+    FAILED,
+    KEYS,
+    LABEL_ERROR,
+    OWN,
+    UNITS,
+    read_archived,
+    write_archive,
+    write_errors,
+)
 from reproduction.replications.effects import (
     BOTH,
     MOVED,
@@ -20,6 +33,8 @@ from reproduction.replications.effects import (
 )
 from reproduction.replications.pooling import CLAIMS, EFFECTS, POOLED, write_pooled
 from synfeal.errors import InputError
+from synfeal.records.tables import write_frame
+from tests.support import claims_results
 
 N_FRAMES, N_PATHS = 240, 40
 # Factors on an error of 0.4 m and 10°, by what a cell is trained with.
@@ -73,7 +88,7 @@ def write_replication(folder, seed):
             frame[unit] = frame[f"true_{unit}"] = np.minimum(size * factor * hard, FAILED).round()
         rows.append(frame)
     folder.mkdir(parents=True)
-    pd.concat(rows).to_parquet(folder / ERRORS, index=False)
+    write_errors(pd.concat(rows, ignore_index=True), folder / ERRORS)
     batches = {"sfm": 2, "rgbd-toro": 1, "rgbd-g2o": 0, "kinect-fusion": 3}
     assistance = [
         {"method": method, "split": split, "assisted": count, "batches": 34}
@@ -162,11 +177,33 @@ def test_tables_hold_each_replication_and_the_pooled_effect(pooled):
 
 def test_a_failed_prediction_is_the_worst_and_one_archive_is_not_pooled(tmp_path):
     folder = write_replication(tmp_path / "101", 101)
-    errors = pd.read_parquet(folder / ERRORS)
+    errors = read_archived(folder / ERRORS)
     bad = (errors["model"] == "posenet") & (errors["labels"] == "sfm") & (errors["frame"] < 200)
     errors.loc[bad, list(UNITS)] = FAILED
-    errors.to_parquet(folder / ERRORS, index=False)
+    write_errors(errors, folder / ERRORS)
     found = Archive(folder).log_errors(Cell("posenet", labels="sfm"), OWN, "labels")
     assert (found[:, 0] == np.inf).all()
     with pytest.raises(InputError, match="two are the least"):
         write_pooled([folder], tmp_path)
+
+
+def test_an_archive_of_the_papers_own_numbers_has_the_printed_effects(tmp_path):
+    """Results whose every frame is as wrong as the printed median, archived and read back."""
+    results = claims_results.papers_results(tmp_path / "results")
+    for name in (ASSISTANCE, LABEL_ERROR):
+        (results.root / "tables").mkdir(exist_ok=True)
+        (results.root / "tables" / name).write_text("method,split\n")
+    write_frame(
+        results.root / "benchmarks.csv",
+        pd.DataFrame(
+            [("train", "a", 2.0, 1.5, 90.0)], columns=["stage", "job", "wall_s", "cpu_s", "peak_mb"]
+        ),
+    )
+    night = load_config(Path("config/config.yaml"), Path("config/night.yaml"))
+    write_archive(results.root, night, tmp_path / "101")
+    found = {
+        effect[:4]: float(effect.sample[0]) for effect in effects_of(Archive(tmp_path / "101"))
+    }
+    for key, printed in printed_effects().items():
+        if key[0] != "C13":  # of images shown, which the paper does not print
+            assert found[key] == pytest.approx(printed, abs=0.01), key
