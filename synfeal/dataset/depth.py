@@ -76,6 +76,12 @@ def is_measured(units: DepthUnits) -> NDArray[np.bool_]:
     return (units > 0) & (units < INVALID_MM)
 
 
+def share_beyond_storage(depth_m: Depth) -> float:
+    """Return the share of pixels that show a surface too far away for its depth to be stored."""
+    depth_mm = np.round(np.asarray(depth_m, np.float64) * MILLIMETRES)
+    return float(np.mean(np.isfinite(depth_mm) & (depth_mm >= INVALID_MM)))
+
+
 def depth_mm_of(depth_m: Depth) -> DepthUnits:
     """Convert depth (H, W) in metres to millimetres; 65535 beyond 65.534 m and for nothing hit."""
     depth_mm = np.round(np.asarray(depth_m, np.float64) * MILLIMETRES)

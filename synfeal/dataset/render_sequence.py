@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import tempfile
 import time
 from collections import deque
@@ -17,7 +18,7 @@ from PIL import Image
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
-from synfeal.dataset.depth import depth_mm_of
+from synfeal.dataset.depth import INVALID_MM, MILLIMETRES, depth_mm_of, share_beyond_storage
 from synfeal.dataset.frame_files import encode_png, is_archive, write_archive
 from synfeal.dataset.layer_files import mask_pixels, normal_pixels
 from synfeal.dataset.packed import NetworkView, fit_frame, new_packed
@@ -46,6 +47,7 @@ from synfeal.records.progress import Progress
 from synfeal.render.choose import fastest_working, graphics
 from synfeal.render.surface import Layers
 
+log = logging.getLogger("synfeal")
 Effects = tuple[CameraConfig, EffectsConfig]
 REMEDY = "nothing was kept; fix that and render again"
 
@@ -128,6 +130,7 @@ def write_sequence(
     """
     with _new_sequence(out) as directory, ThreadPoolExecutor(THREADS) as threads:
         waiting: deque[Future[None]] = deque()
+        beyond = 0.0  # sum of shares
         frames = drawn(renderer, poses, layers, effects)
         to_right: Iterator[Frame | None] = repeat(None, len(poses))
         if stereo_baseline_m is not None:
@@ -137,12 +140,27 @@ def write_sequence(
             every = zip(poses.world_from_cam, frames, to_right, strict=True)
             for number, (pose, frame, right) in enumerate(every):
                 stem = directory / f"frame-{number:06d}"
+                if frame.depth_m is not None:
+                    beyond += share_beyond_storage(frame.depth_m)
                 waiting.append(threads.submit(_write_frame, stem, pose, frame, right))
                 while len(waiting) > (MOST_WAITING if number + 1 < len(poses) else 0):
                     waiting.popleft().result()
                     on_frame()
         finally:
             threads.shutdown(cancel_futures=True)
+    if beyond:
+        _warn_of_far_depth(out.name, beyond / len(poses))
+
+
+def _warn_of_far_depth(name: str, share: float) -> None:
+    log.warning(
+        "%s: %.2g %% of the pixels show a surface farther than %.1f m, the most that depth in"
+        " millimetres of 16 bits can hold; they have colour, and read as nothing in its depth"
+        " images. Keep the camera nearer (--box), or take their depth from Renderer.render_rgbd",
+        name,
+        100 * share,
+        (INVALID_MM - 1) / MILLIMETRES,
+    )
 
 
 def _write_frame(

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 EXTENTS_M = (1.0, 200.0)
 UNITS_M = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches", 10.0: "", 100.0: ""}
 UNITS_M |= {1000.0: "kilometres"}
+LEAST_ROOM_HEIGHT_M = 1.5  # what is flatter in a unit is no room in it
 ALIGNED_COS = np.cos(np.deg2rad(15.0))
 FLOOR_BIN_M = 0.1
 FLOOR_RATIO = 1.5
@@ -50,7 +51,7 @@ def doubts_of(
     return _that_hold(
         (
             not EXTENTS_M[0] <= longest_m <= EXTENTS_M[1],
-            f"the mesh is {longest_m:.3g} m long: {_unit_advice(longest_m, unit_m)}",
+            f"the mesh is {longest_m:.3g} m long: {_unit_advice(extents_m, unit_m)}",
         ),
         (
             axis != 2 and floors_m2[axis] >= FLOOR_RATIO * floors_m2[2],
@@ -75,20 +76,34 @@ def doubts_of(
     )
 
 
-def units_of_a_room(longest: float) -> list[float]:
-    """List the usual units, in metres, in which a mesh of this length is as large as a room."""
+def units_of_a_room(extents: Array) -> list[float]:
+    """List the usual units, in metres, in which a mesh is as large as a room.
+
+    Args:
+        extents: Size (3,) of the mesh in units of its file.
+    """
     low_m, high_m = EXTENTS_M
-    return [unit_m for unit_m in sorted({1.0, *UNITS_M}) if low_m <= longest * unit_m <= high_m]
+    longest, shortest = float(extents.max()), float(extents.min())
+    return [
+        unit_m
+        for unit_m in sorted({1.0, *UNITS_M})
+        if low_m <= longest * unit_m <= high_m
+        # Terrain is long and flat: small enough in inches, it would be lower than a table.
+        and (unit_m >= 1.0 or shortest * unit_m >= LEAST_ROOM_HEIGHT_M)
+    ]
 
 
-def _unit_advice(longest_m: float, unit_m: float) -> str:
+def _unit_advice(extents_m: Array, unit_m: float) -> str:
     """Say what to do about a mesh that is too long or too short in this unit."""
-    units = [f"{unit:g}" for unit in units_of_a_room(longest_m / unit_m)]
+    units = [f"{unit:g}" for unit in units_of_a_room(extents_m / unit_m)]
     if units:
         named = " or ".join([", ".join(units[:-1]), units[-1]] if units[1:] else units)
         return f"the unit is probably wrong; try --unit-m {named}"
-    if longest_m > EXTENTS_M[1]:
-        return "in no usual unit is that a room; remove what lies far away from the rest of it"
+    if extents_m.max() > EXTENTS_M[1]:
+        return (
+            "in no usual unit is that a room. If it is terrain or a town, all is well, but for"
+            " depth, which is stored up to 65.5 m; else remove what lies far away from the rest"
+        )
     return "in no usual unit is that a room; measure it, and give --unit-m"
 
 
@@ -198,7 +213,7 @@ def load_as_meant(
     mesh, notes = _load(scene), []
     extents_m = np.ptp(mesh.bounds_m, axis=0)
     is_odd = not EXTENTS_M[0] <= extents_m.max() <= EXTENTS_M[1]
-    units = units_of_a_room(float(extents_m.max()) / scene.unit_m)
+    units = units_of_a_room(extents_m / scene.unit_m)
     if is_odd and units and not unit_is_given:
         # What makes the smallest extent most like the height of a room.
         height = max(extents_m.min(), 1e-9) / STOREY_M

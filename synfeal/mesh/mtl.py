@@ -15,8 +15,8 @@ from synfeal.mesh.text_rows import decoded
 # Options of textures: how many numbers may follow, and how many must.
 OPTIONS = {"-o": (3, 1), "-s": (3, 1), "-t": (3, 1), "-mm": (2, 2), "-texres": (2, 1)}
 OPTIONS |= {"-boost": (1, 1), "-bm": (1, 1)}
-WORDS = {"-clamp", "-blendu", "-blendv", "-cc", "-imfchan", "-type"}  # one word follows
-WITHOUT_EFFECT = {"-blendu", "-blendv", "-boost", "-texres", "-bm", "-type", "-cc"}
+WORDS = {"-clamp", "-blendu", "-blendv", "-cc", "-imfchan", "-type", "-colorspace"}  # one follows
+WITHOUT_EFFECT = {"-blendu", "-blendv", "-boost", "-texres", "-bm", "-type", "-cc", "-colorspace"}
 OPAQUE_FROM = 0.999  # of Tr: written as 1.000000
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 import numpy as np
@@ -79,6 +79,8 @@ def _what_instead(text: ObjText) -> str:
         return f"holds no faces but free-form surfaces, which are not read; {remedy}"
     if text.skipped["l"]:
         return f"holds no faces but {text.skipped['l']} lines; {remedy}"
+    if text.short:
+        return f"no face has 3 corners; {remedy}"
     if len(text.vertices):
         return (
             f"holds no faces but {len(text.vertices)} points; make a surface of them, as MeshLab's"
@@ -96,6 +98,8 @@ def _report(text: ObjText, findings: Findings) -> None:
         findings.note(f"{' and '.join(unseen)} are not drawn")
     if text.short:
         findings.warn(f"{text.short} faces with fewer than 3 corners left out")
+    if text.lacks_uv:
+        findings.warn("faces name texture coordinates, of which the file has none")
     count = skipped.pop("free form", 0)
     if count:
         findings.warn(f"{count} statements of free-form surfaces are not read; export polygons")
@@ -117,12 +121,15 @@ class _Library:
         self._opaque: set[str] = set()
         self._reduced: dict[str, ObjMaterial] = {}
         self._only: str | None = None
+        self._folders: dict[str, PurePosixPath] = {}  # of the library that defines a material
 
     def read(self, text: ObjText) -> None:
         """Read all libraries, and name what faces use that none of them defines."""
-        for content in self._contents(text):
+        for name, content in self._contents(text):
             for material in parse_mtl(content):
                 known = self._defined.setdefault(material.name, material)
+                folder = PurePosixPath(name.strip('"').replace("\\", "/")).parent
+                self._folders.setdefault(material.name, folder)
                 if known != material:
                     self._findings.warn(
                         f"material '{material.name}' is defined twice; the first counts"
@@ -154,8 +161,8 @@ class _Library:
                 f"'Tr 1' taken as opaque, as MeshLab and OpenMVS mean it: {_named(self._opaque)}"
             )
 
-    def _contents(self, text: ObjText) -> Iterator[bytes]:
-        """Yield the libraries that are named, or those that lie beside the file instead."""
+    def _contents(self, text: ObjText) -> Iterator[tuple[str, bytes]]:
+        """Yield name and content of the libraries, or of one that lies beside the file instead."""
         missing, found = [], set()
         for line in dict.fromkeys(text.libraries):
             for name, content in self._named_files(line):
@@ -163,7 +170,7 @@ class _Library:
                     missing.append(name)
                 elif name not in found:
                     found.add(name)
-                    yield content
+                    yield name, content
         uses_some = any(use.material for use in text.uses)
         if not missing and (found or not uses_some):
             return
@@ -173,7 +180,7 @@ class _Library:
                 told = ", ".join(f"'{name}'" for name in missing) or "no mtllib"
                 what = f"{told} is missing" if missing else "no mtllib names a library"
                 self._findings.warn(f"{what}; '{name}' beside the file is read instead")
-                yield content
+                yield name, content
                 return
         self._resolver.missing += missing
         if not missing:
@@ -214,7 +221,7 @@ class _Library:
         if texture_map is None and material.other_texture is not None:
             keyword, texture_map = material.other_texture
             self._findings.note(f"{owner}: has no map_Kd; its {keyword} is shown")
-        texture = None if texture_map is None else self._pixels(texture_map, owner)
+        texture = None if texture_map is None else self._pixels(texture_map, material, owner)
         base = self._plain_color(material, owner) if texture is None else WHITE.copy()
         opacity = self._opacity(material)
         base[3] = round(255 * opacity)
@@ -253,11 +260,18 @@ class _Library:
             return 1.0
         return 1.0 - float(np.clip(np.nan_to_num(material.transparency), 0.0, 1.0))
 
-    def _pixels(self, texture: TextureMap, owner: str) -> Pixels | None:
+    def _place(self, name: str, material: MtlMaterial) -> str:
+        """Return the name of a texture as seen from the mesh: it may lie beside its library."""
+        beside = (self._folders[material.name] / name).as_posix()
+        if self._resolver.find(name) is None and self._resolver.find(beside) is not None:
+            return beside
+        return name
+
+    def _pixels(self, texture: TextureMap, material: MtlMaterial, owner: str) -> Pixels | None:
         """Read a texture (H, W, 3 | 4), with its colours as ``-mm`` changes them."""
         for option in texture.unread:
             self._findings.warn(f"{owner}: option {option} of its texture is not followed")
-        pixels = self._textures.read(texture.name, owner)
+        pixels = self._textures.read(self._place(texture.name, material), owner)
         if pixels is None or (texture.base, texture.gain) == (0.0, 1.0):
             return pixels
         changed = np.round(255 * texture.base + texture.gain * pixels[..., :3])
@@ -272,7 +286,7 @@ class _Library:
         color_map = material.texture
         if texture is not None and color_map is not None and color_map.name == opacity_map.name:
             return texture
-        opacity = self._textures.read(opacity_map.name, owner)
+        opacity = self._textures.read(self._place(opacity_map.name, material), owner)
         if opacity is None:
             return texture
         options = (opacity_map.offset, opacity_map.scale, opacity_map.is_clamped)

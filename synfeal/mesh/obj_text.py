@@ -67,6 +67,7 @@ class ObjText:
         libraries: What stands behind each ``mtllib``.
         skipped: How often each statement was met that is not read.
         short: Number of faces with fewer than three corners.
+        lacks_uv: Whether faces name texture coordinates and the file has none.
     """
 
     vertices: Floats
@@ -80,6 +81,7 @@ class ObjText:
     libraries: list[str]
     skipped: Counter[str]
     short: int
+    lacks_uv: bool = False
 
 
 def parse_obj(content: bytes) -> ObjText:
@@ -103,7 +105,7 @@ def _plain(content: bytes) -> bytes:
         raise ValueError("it holds bytes of zero, so it is no text")
     if b"\r" in text:
         text = text.replace(b"\r\n", b"\n")
-    text = text.translate(BLANKS)
+    text = text.translate(BLANKS).removesuffix(b"\\")
     return joined(text) if b"\\\n" in text else text
 
 
@@ -310,8 +312,7 @@ class _Reader:
         if whole.colors is not None and np.isnan(whole.colors).all():
             whole.colors = None
         if not len(whole.uv):
-            if (whole.corner_uv != NO_UV).any():
-                whole.skipped["texture coordinates that are named and not there"] += 1
+            whole.lacks_uv = bool((whole.corner_uv != NO_UV).any())
             whole.corner_uv[:] = NO_UV
         _check_range(whole.corner_vertex, self.n_vertices, "vertex", least=0)
         _check_range(whole.corner_uv, self.n_uv, "texture coordinate", least=NO_UV)

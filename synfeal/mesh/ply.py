@@ -178,6 +178,11 @@ class _Reader:
         vertex = polygons.corners[triangles.corners]
         row = polygons.row[triangles.polygon]
         uv = self._uv(polygons)
+        if self._files and uv is None:
+            self._findings.warn(
+                f"names the texture '{self._files[0]}', but has no texture coordinates; drawn"
+                " without"
+            )
         if uv is None or not self._files:
             return [self._plain(vertex, row)]
         number = self._text.numbers("face", "texnumber")

@@ -22,7 +22,7 @@ TYPES |= {"float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "
 TYPES |= {"uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"}
 TYPES |= {"int64": "i8", "uint64": "u8", "half": "f2", "float16": "f2", "longlong": "i8"}
 BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
-END = b"end_header"
+KEYWORDS = {"format", "element", "property"}
 MOST_HEADER_BYTES = 1 << 20
 
 
@@ -130,7 +130,9 @@ def _header(content: bytes) -> tuple[str, list[str], list[Element], bytes]:
                 last = elements[-1]
                 properties = (*last.properties, _property(rest, line))
                 elements[-1] = Element(last.name, last.count, properties)
-            case [] | ["ply"]:
+            case [word, *_] if word not in KEYWORDS:  # a comment that somebody broke in two
+                comments.append(" ".join(words))
+            case []:
                 pass
             case _:
                 raise ValueError(f"its header has '{shown(line)}'")

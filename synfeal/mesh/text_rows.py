@@ -76,7 +76,10 @@ def _blamed(block: bytes, n_columns: int, dtype: type) -> ValueError:
         for word in words:
             try:
                 kind(word)
+                is_number = b"_" not in word  # which Python allows between digits
             except ValueError:
+                is_number = False
+            if not is_number:
                 hint = "; write decimals with a point" if b"," in word else ""
                 noun = "number" if kind is float else "whole number"
                 return ValueError(f"'{shown(word)}' in '{shown(line)}' is no {noun}{hint}")

@@ -5,7 +5,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from synfeal.dataset.depth import depth_mm_of, is_measured, read_depth_m, read_depth_units
+from synfeal.dataset.depth import (
+    depth_mm_of,
+    is_measured,
+    read_depth_m,
+    read_depth_units,
+    share_beyond_storage,
+)
 from synfeal.dataset.frame_files import encode_png
 from synfeal.errors import InputError
 
@@ -63,3 +69,8 @@ def test_other_images_are_refused_in_one_line(pixels, line, tmp_path):
 def test_a_missing_image_is_named(tmp_path):
     with pytest.raises(InputError, match=r"frame-000000\.depth\.png: missing$"):
         read_depth_units(tmp_path / "frame-000000.depth.png")
+
+
+def test_the_share_beyond_what_can_be_stored_counts_surfaces_alone():
+    depth_m = np.array([[1.0, 65.534, 65.536, 99.0], [np.inf, np.inf, 0.5, 2.0]], np.float32)
+    assert share_beyond_storage(depth_m) == 2 / 8

@@ -241,6 +241,7 @@ def doubts(extents, **values):
         ((6e7, 5e7, 4e7), 1.0, ["6e+07 m", "remove what lies far away"]),
         ((6e4, 5e4, 4e4), 0.001, ["6e+04 m", "remove what lies far away"]),
         ((2e-4, 1e-4, 1e-4), 1.0, ["0.0002 m", "give --unit-m"]),
+        ((400.0, 400.0, 12.0), 1.0, ["400 m", "terrain or a town"]),
     ],
 )
 def test_sizes_that_are_not_metres_are_doubted(extents, unit_m, words):
@@ -263,6 +264,13 @@ def test_a_unit_is_assumed_only_where_it_makes_a_room(tmp_path, side, taken):
     found = doubts(np.ptp(mesh.bounds_m, axis=0), unit_m=scene.unit_m)
     assert "--unit-m" not in found
     assert bool(found) == (side == 6e7)
+
+
+def test_terrain_is_no_room_in_inches(tmp_path):
+    trimesh.creation.box((400.0, 400.0, 12.0)).export(tmp_path / "box.ply")
+    scene, _, notes = load_as_meant(scene_config({"mesh": tmp_path / "box.ply"}), False)
+    assert scene.unit_m == 1.0
+    assert notes == []
 
 
 def test_plain_and_open_meshes_are_doubted_and_a_flat_floor_is_a_floor():

@@ -198,6 +198,15 @@ def test_all_libraries_are_read(write, line):
     assert mesh.findings == ()
 
 
+def test_textures_lie_beside_their_library_too(write, tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "walls.mtl").write_text(mtl_of().replace("red.png", "only here.png"))
+    (tmp_path / "red.png").rename(tmp_path / "sub" / "only here.png")
+    mesh = write(four_squares(header="mtllib sub/walls.mtl\n"))
+    assert colors_along(mesh, MIDDLES) == [list(color) for color in PAINTS.values()]
+    assert mesh.findings == ()
+
+
 def test_a_library_that_is_missing_and_one_that_lies_beside_instead(write):
     mesh = write(four_squares(header="mtllib gone.mtl\n"), scene=mtl_of())
     assert "'gone.mtl' is missing; 'scene.mtl' beside the file is read instead" in mesh.findings
