@@ -8,6 +8,8 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 SLURM_INSTALLED := $(VENV)/installed-slurm
 QUALITY := $(VENV)/quality
+DOCS := $(VENV)/docs
+SPHINX := $(BIN)/sphinx-build -c docs/site -d build/doctrees
 RUN := $(BIN)/synfeal run --cores $(CORES)
 # `make real`: what is scanned, where its results go, and other labels of it (docs/real.md).
 SEVEN_SCENES ?=
@@ -20,7 +22,7 @@ export PYTHONHASHSEED := 0
 # nothing of that is kept, and every job compiles a thousand modules again, half of its start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help reproduce smoke real start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock wheels compile clean
+.PHONY: help reproduce smoke real start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock wheels docs docs-links compile clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -112,6 +114,14 @@ wheels: $(INSTALLED)  ## sdists and wheels of the three distributions (build/dis
 	for folder in . baselines reproduction; do \
 	  $(BIN)/python -m build --no-isolation --outdir build/dist $$folder || exit 1; done
 
+docs: $(DOCS)  ## the documentation site, its links checked (build/site)
+	rm -rf build/site
+	$(SPHINX) --fail-on-warning --keep-going --quiet . build/site
+	$(BIN)/python docs/site/check.py build/site
+
+docs-links: $(DOCS)  ## try the links that lead out of the documentation
+	$(SPHINX) -b linkcheck --quiet . build/links
+
 compile: $(INSTALLED)  ## compile all installed modules, for images that keep nothing compiled later
 	@# Some packages have modules that this Python cannot read and nobody imports.
 	-$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib synfeal baselines reproduction workflow
@@ -130,6 +140,10 @@ $(INSTALLED): $(LOCK) pyproject.toml baselines/pyproject.toml reproduction/pypro
 
 $(QUALITY): $(INSTALLED)
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable '.[quality]'
+	touch $@
+
+$(DOCS): $(INSTALLED) requirements-docs.lock
+	$(BIN)/python -m pip install --quiet --no-deps --requirement requirements-docs.lock
 	touch $@
 
 $(SLURM_INSTALLED): $(INSTALLED) requirements-slurm.lock

@@ -10,6 +10,8 @@ from synfeal.geometry.poses import umeyama_sim3
 from synfeal.geometry.rotations import matrix_from_quat_wxyz
 from tests.support import property_support as drawn
 
+pytestmark = pytest.mark.portable
+
 AXIS = np.array([2.0, -3.0, 6.0]) / 7.0
 
 

@@ -11,6 +11,8 @@ from synfeal.mesh.rays import RayCaster
 from synfeal.planning.plan import plan_mesh, plan_split
 from tests.support.empty_room import ROOM, SCENE, mesh_of
 
+pytestmark = pytest.mark.portable
+
 COLLECTION = CollectionConfig(max_tries=300, frame_spacing_m=0.1, min_path_m=1.0)
 
 

@@ -26,6 +26,8 @@ from synfeal.planning.space import ConnectedSpace
 from tests.support import empty_room as room
 from tests.support.property_support import directions, few, fewer, poses, seeds, table_of, vectors
 
+pytestmark = pytest.mark.portable
+
 CUBE = np.array([[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]])
 SAMPLED = 4 * np.sqrt(0.25 / 20_000)  # four standard errors of a share of the points
 ALL_AROUND = [(0.0, yaw) for yaw in (0.0, 90.0, 180.0, 270.0)] + [(90.0, 0.0), (-90.0, 0.0)]

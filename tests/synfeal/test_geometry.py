@@ -40,6 +40,8 @@ from tests.support.property_support import (
     vectors,
 )
 
+pytestmark = pytest.mark.portable
+
 
 def test_batches_keep_their_shape_and_arguments_and_far_poses_their_digits():
     quats = np.tile([0.8, 0.0, 0.6, 0.0], (2, 5, 1))

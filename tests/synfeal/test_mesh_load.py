@@ -19,6 +19,8 @@ from tests.support.mesh_samples import (
     write_obj,
 )
 
+pytestmark = pytest.mark.portable
+
 
 @pytest.fixture
 def paint(tmp_path):

@@ -19,6 +19,8 @@ from synfeal.mesh.save import save_glb
 from synfeal.render import open_renderer
 from tests.support.mesh_samples import FACE, TRIANGLE, UV, box_mesh
 
+pytestmark = pytest.mark.portable
+
 
 def there_and_back(mesh):
     with TemporaryDirectory() as folder:

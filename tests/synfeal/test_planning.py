@@ -27,6 +27,8 @@ from synfeal.planning.space import (
 from tests.support.empty_room import EMPTY, ROOM, SCENE, caster_of, pose_vectors
 from tests.support.property_support import few, vectors
 
+pytestmark = pytest.mark.portable
+
 VIEW_M, MIN_PATH_M, SPACING_M = 1.2, 1.5, 0.25
 
 

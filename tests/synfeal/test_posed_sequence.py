@@ -15,6 +15,8 @@ from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.dataset.world import read_sequence_from_world, write_sequence_from_world
 from synfeal.errors import InputError
 
+pytestmark = pytest.mark.portable
+
 
 def pose_of(number: int) -> NDArray[np.float64]:
     """A rigid pose that tells which frame it belongs to: x is the number."""

@@ -38,6 +38,8 @@ from tests.support.empty_room import (
 )
 from tests.support.property_support import few, fewer, seeds, vectors
 
+pytestmark = pytest.mark.portable
+
 distances = st.floats(0.0, 4.0)
 
 

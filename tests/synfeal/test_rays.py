@@ -16,6 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from synfeal.mesh.rays import RayCaster
 
+pytestmark = pytest.mark.portable
+
 Array = NDArray[np.float64]
 BAND = 1e-6  # what the ray caster promises: points moved by this share of the mesh's extent
 

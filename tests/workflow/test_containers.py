@@ -36,17 +36,18 @@ def pins(name):
 def test_every_dependency_is_locked_within_its_range():
     project = tomllib.loads(read("pyproject.toml"))["project"]
     locked = pins(CPU)
-    slurm = pins("requirements-slurm.lock")
+    slurm, docs = pins("requirements-slurm.lock"), pins("requirements-docs.lock")
     assert not slurm.keys() & locked.keys()
+    assert not docs.keys() & locked.keys()
     further = project["optional-dependencies"]
-    needed = [*project["dependencies"], *further["dev"]]
+    needed = [*project["dependencies"], *further["dev"], *further["docs"]]
     for name in ("baselines", "reproduction"):
         above = tomllib.loads(read(f"{name}/pyproject.toml"))
         needed += above["tool"]["hatch"]["metadata"]["hooks"]["custom"]["dependencies"]
         needed += above["project"].get("optional-dependencies", {}).get("slurm", [])
     for text in needed:
         requirement = Requirement(text)
-        version = (locked | slurm)[canonicalize_name(requirement.name)]
+        version = (locked | slurm | docs)[canonicalize_name(requirement.name)]
         assert requirement.specifier.contains(version, prereleases=True), requirement
 
 
