@@ -57,7 +57,7 @@ def test_a_thumbnail_is_what_lies_under_its_pixels_whatever_the_brightness(tmp_p
     dark, flat = thumbnails(paths, CAMERA)
     assert dark @ vector.ravel() > 0.999
     assert not flat.any()
-    with pytest.raises(InputError, match="no such image"):
+    with pytest.raises(InputError, match="missing; collect the data set again"):
         thumbnails([tmp_path / "none.png"], CAMERA)
 
 

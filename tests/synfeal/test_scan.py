@@ -164,7 +164,7 @@ def test_poses_in_the_other_direction(
         ("no depth image", "frame-000004.depth.png: missing"),
         ("no depth", "has no depth images"),
         ("poses of others", "depth and poses do not fit together"),
-        ("other size", "must be of one camera"),
+        ("other size", "all images of a camera must be of its size"),
     ],
 )
 def test_sequences_that_cannot_be_scanned(
