@@ -1,8 +1,9 @@
 """Install wheels alone into an empty environment, use them, and say what that took.
 
 ``smoke.py WHEELS simulator|scan|baselines|reproduction [--folder DIR]``: WHEELS is a folder of the
-project's wheels. Nothing is compiled (pip takes wheels only), and nothing of the checkout can be
-imported. Prints the seconds and megabytes of the installation, and of every command the seconds.
+project's wheels. Nothing is compiled (pip takes wheels only, but for PyOpenGL), and nothing of the
+checkout can be imported. Prints the seconds and megabytes of the installation, and of every
+command the seconds.
 """
 
 from __future__ import annotations
@@ -66,12 +67,14 @@ def main() -> None:
 def smoke(wheels: Path, part: str, folder: Path) -> None:
     """Install ``part`` from ``wheels`` into ``folder``, and run its commands there."""
     requirement, commands = PARTS[part]
+    # PyOpenGL 3.1.0, which pyrender pins, is pure Python but has no wheel.
+    kinds = ["--prefer-binary"] if part == "reproduction" else ["--only-binary", ":all:"]
     run(folder, sys.executable, "-m", "venv", "venv")
     binaries = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
     python = binaries / "python"
     empty_mb = megabytes(folder / "venv")
     seconds = run(
-        folder, python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:",
+        folder, python, "-m", "pip", "install", "--quiet", *kinds,
         "--find-links", wheels, requirement,
     )  # fmt: skip
     print(f"install {requirement}: {seconds:.0f} s, {megabytes(folder / 'venv') - empty_mb:.0f} MB")
