@@ -107,6 +107,25 @@ def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
         metavar="on|off|FILE",
     ),
     *CALIBRATION_OPTIONS,
+    option(
+        "--input-px",
+        "side of the network's image (64 on a processor, 224 on a GPU)",
+        type=int,
+        metavar="PX",
+    ),
+    option(
+        "--width",
+        "factor on the network's channels (0.25 on a processor, 1 on a GPU)",
+        type=float,
+        metavar="FACTOR",
+    ),
+    option("--batch", "images per step (64)", type=int, default=64, metavar="N"),
+    option(
+        "--start",
+        "weights that the backbone starts from (those of the package at width 0.25, else none)",
+        type=Path,
+        metavar="FILE",
+    ),
     option("--device", "where to train (auto)", choices=("auto", "cpu", "cuda"), default="auto"),
     option("--seed", "seed of all random numbers (0)", type=int, default=0),
 )
@@ -131,6 +150,10 @@ def train(arguments: argparse.Namespace) -> None:
         photographs=photograph_camera(arguments),
         held_out=arguments.held_out,
         randomisation=_randomisation(arguments.randomisation),
+        input_px=arguments.input_px,
+        width=arguments.width,
+        batch=arguments.batch,
+        start=arguments.start,
         device=arguments.device,
         seed=arguments.seed,
     )

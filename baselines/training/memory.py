@@ -5,6 +5,8 @@ Free of torch, so that a workflow may import it.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from baselines.config.learning import NetworkConfig
 
 # The program and its libraries.
@@ -30,3 +32,17 @@ def training_mb(n_frames: int, network: NetworkConfig, batch_size: int) -> int:
     parameters = PARAMETERS_MB_PER_PX * network.width**2
     per_px = PACKED_MB_PER_PX * n_frames + layers + parameters
     return round(PROGRAM_MB + network.input_px**2 * per_px)
+
+
+def free_mb(meminfo: Path = Path("/proc/meminfo")) -> float | None:
+    """Return the memory in MB that programs of this machine can still have, where it says so.
+
+    Args:
+        meminfo: Linux' list of its memory.
+    """
+    try:
+        lines = meminfo.read_text().splitlines()
+    except OSError:
+        return None  # another system
+    found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+    return int(found[0]) * 1024 / 1e6 if found else None

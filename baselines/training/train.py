@@ -9,7 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import torch
+from pydantic import ValidationError
+
 from baselines.config.learning import (
+    SHIPPED_WIDTH,
     AugmentationConfig,
     LocalizerConfig,
     ModelName,
@@ -19,7 +23,10 @@ from baselines.config.learning import (
 )
 from baselines.localizers.backbones.shipped import shipped_weights_path
 from baselines.localizers.registry import backbone_of
+from baselines.training.data import MOST_READ_BYTES
+from baselines.training.device import open_device
 from baselines.training.fit import FOR_PHOTOGRAPHS
+from baselines.training.memory import free_mb, training_mb
 from baselines.training.own_frames import (
     FrameRange,
     OwnFrames,
@@ -40,6 +47,8 @@ log = logging.getLogger(__name__)
 
 # The network of the default profile, whose backbones are shipped.
 NETWORK = NetworkConfig(input_px=64, view="whole", width=0.25)
+# That of the paper, which a GPU learns in minutes.
+GPU_NETWORK = NetworkConfig(input_px=224, view="whole", width=1.0)
 RATE = 1.5e-3
 RECIPES: dict[ModelName, LocalizerConfig] = {
     "posenet": LocalizerConfig(learning_rate=RATE, beta=1.0, dropout=0.1),
@@ -82,6 +91,11 @@ class TrainJob:
         held_out: Share of the paths that are not learned from and tell the error.
         randomisation: Ranges of light, lens and sensor; None to show images as they are.
         rotations: Rotations of images; they need a known camera without distortion.
+        input_px: Side of the network's image; None: 64 on a processor, 224 on a GPU.
+        width: Factor on the network's channels; None: 0.25 on a processor, 1 on a GPU.
+        batch: Images per step.
+        start: State dict that the backbone starts from; None: the shipped weights where they fit,
+            otherwise from scratch.
         device: Device to train on.
         seed: Seed of all that is drawn.
     """
@@ -96,6 +110,10 @@ class TrainJob:
     held_out: float = 0.1
     randomisation: PhotometricConfig | None = field(default_factory=PhotometricConfig)
     rotations: AugmentationConfig = ROTATIONS
+    input_px: int | None = None
+    width: float | None = None
+    batch: int = BATCH
+    start: Path | None = None
     device: Literal["auto", "cpu", "cuda"] = "auto"
     seed: int = 0
 
@@ -131,7 +149,9 @@ def train(job: TrainJob) -> TrainedModel:
         MemoryError: There is too little memory; no model is written.
     """
     _check(job)
-    settings = _settings(job)
+    device = open_device(job.device)
+    network = _network(job, device)
+    settings = _settings(job, network)
     if (job.out / RECORD).exists():
         return _finished(job, settings)
     sets = [read_own_frames(folder, job.ranges) for folder in job.datasets]
@@ -142,8 +162,8 @@ def train(job: TrainJob) -> TrainedModel:
     job.out.mkdir(parents=True, exist_ok=True)
     try:
         with writing_to(job.out, lambda: "run the same command again when that is mended"):
-            packed = pack_own_frames(sets, job.photographs, NETWORK, job.out)
-            run = _job_of(job, packed)
+            packed = pack_own_frames(sets, job.photographs, network, job.out)
+            run = _job_of(job, network, packed)
             return _trained(job, run, sets, packed, settings)
     except InputError:
         if is_new and not any(job.out.iterdir()):
@@ -166,7 +186,7 @@ def _trained(
         packed.labels,
         job.out / MODEL,
         job.out / HISTORY,
-        weights=_start_of(run),
+        weights=_start_of(job, run),
         sequence_from_world=packed.sequence_from_world,
         scene=" + ".join(dict.fromkeys(own.scene for own in sets)),
         calibrated=True,
@@ -196,6 +216,10 @@ def _check(job: TrainJob) -> None:
         raise InputError(f"--images: must be 1 to {MOST_IMAGES:,}, found {job.images}")
     if job.minutes is not None and not 0 < job.minutes < 1e6:
         raise InputError(f"--minutes: must be above 0 and below 1e6, found {job.minutes:g}")
+    if job.batch < 1:
+        raise InputError(f"--batch: must be at least 1, found {job.batch}")
+    if job.start is not None and not job.start.is_file():
+        raise InputError(f"--start: {job.start} is no file; name a backbone's weights")
     if not 0 <= job.held_out < 1:
         raise InputError(f"--held-out: must be a share from 0 to below 1, found {job.held_out:g}")
     named = [path.resolve() for path in job.datasets]
@@ -226,7 +250,44 @@ def _is_left(name: str) -> bool:
     return any(name.startswith(f".{stem}-") for stem in stems)
 
 
-def _settings(job: TrainJob) -> dict[str, Any]:
+def _network(job: TrainJob, device: torch.device) -> NetworkConfig:
+    """Return the shape of the network that is asked for, or suits the device."""
+    usual = NETWORK if device.type == "cpu" else GPU_NETWORK
+    asked = {"input_px": job.input_px, "width": job.width}
+    chosen = {name: value for name, value in asked.items() if value is not None}
+    try:
+        return NetworkConfig.model_validate(usual.model_dump() | chosen)
+    except ValidationError as error:
+        field = str(error.errors()[0]["loc"][0])
+        option = f"--{field.replace('_', '-')}"
+        raise InputError(f"{option}: {error.errors()[0]['msg']}, found {asked[field]}") from error
+
+
+def _refuse_what_does_not_fit(
+    job: TrainJob, network: NetworkConfig, n_frames: int, device: torch.device
+) -> None:
+    """Refuse a network and a batch for which the device has too little memory."""
+    n_held = n_frames
+    if device.type == "cpu":
+        free = free_mb()
+        n_bytes = 3 * network.input_px**2 * n_frames
+        n_held = 0 if n_bytes > MOST_READ_BYTES else n_frames  # others stay on the disk
+    else:
+        free = torch.cuda.mem_get_info(device)[0] / 1e6
+    needed = training_mb(n_held, network, job.batch)
+    if free is not None and needed > free:
+        raise InputError(
+            f"--batch: {job.batch} images of {network.input_px} pixels and width"
+            f" {network.width:g} take about {needed / 1e3:.1f} GB, and {free / 1e3:.1f} GB are free"
+            f" on {device.type}; lower --batch, --input-px or --width"
+        )
+
+
+# Of runs whose record does not say it: earlier versions knew one network.
+SETTINGS_BEFORE = {"input_px": 64, "width": 0.25, "batch": 64, "start": None}
+
+
+def _settings(job: TrainJob, network: NetworkConfig) -> dict[str, Any]:
     """Collect all that decides the weights but the frames themselves, ready for JSON."""
     camera = job.photographs
     return {
@@ -242,6 +303,10 @@ def _settings(job: TrainJob) -> dict[str, Any]:
             None if job.randomisation is None else job.randomisation.model_dump(mode="json")
         ),
         "rotations": job.rotations.model_dump(mode="json"),
+        "input_px": network.input_px,
+        "width": network.width,
+        "batch": job.batch,
+        "start": None if job.start is None else str(job.start),
         "seed": job.seed,
     }
 
@@ -250,7 +315,8 @@ def _finished(job: TrainJob, settings: dict[str, Any]) -> TrainedModel:
     """Return the run that ended here, or refuse one that was trained otherwise."""
     path = job.out / RECORD
     record = read_json(path)
-    differing = [key for key in settings if record["settings"].get(key) != settings[key]]
+    before = SETTINGS_BEFORE | record["settings"]
+    differing = [key for key in settings if before.get(key) != settings[key]]
     if differing or not (job.out / MODEL).is_file():
         what = f"with another {differing[0]}" if differing else "and its model.pt is gone"
         raise InputError(
@@ -264,11 +330,11 @@ def _finished(job: TrainJob, settings: dict[str, Any]) -> TrainedModel:
     )
 
 
-def _job_of(job: TrainJob, packed: PackedFrames) -> Job:
+def _job_of(job: TrainJob, network: NetworkConfig, packed: PackedFrames) -> Job:
     """Describe the training run as the benchmark's are described."""
     training = TrainingConfig(
         samples_seen={},
-        batch_size=BATCH,
+        batch_size=job.batch,
         validation_share=job.held_out,
         augmentation=_rotations(job, packed),
         randomisation=job.randomisation,
@@ -276,16 +342,16 @@ def _job_of(job: TrainJob, packed: PackedFrames) -> Job:
     )
     run = Job(
         name=job.localizer,
-        network=NETWORK,
+        network=network,
         hyper=recipe_of(job.localizer),
         training=training,
-        samples_seen=job.images or BATCH,
+        samples_seen=job.images or job.batch,
         seed=job.seed,
         exchanged=FOR_PHOTOGRAPHS,
     )
     if job.minutes is None:
         return run
-    return run._replace(samples_seen=_images_in(job.minutes, run, packed, job.out))
+    return run._replace(samples_seen=_images_in(job.minutes, job, run, packed))
 
 
 def _rotations(job: TrainJob, packed: PackedFrames) -> AugmentationConfig:
@@ -299,19 +365,26 @@ def _rotations(job: TrainJob, packed: PackedFrames) -> AugmentationConfig:
     return AugmentationConfig()
 
 
-def _images_in(minutes: float, run: Job, packed: PackedFrames, out: Path) -> int:
+def _images_in(minutes: float, job: TrainJob, run: Job, packed: PackedFrames) -> int:
     """Settle how many images to show, once: a run that goes on must not change it."""
-    path = out / "budget.json"
+    path = job.out / "budget.json"
+    shape = {"input_px": run.network.input_px, "width": run.network.width, "batch": job.batch}
+    asked = {"minutes": minutes, "localizer": run.name, **shape}
     if path.is_file():
-        settled = read_json(path)
-        if settled.get("minutes") == minutes and settled.get("localizer") == run.name:
+        settled = SETTINGS_BEFORE | read_json(path)
+        if {key: settled.get(key) for key in asked} == asked:
             return int(settled["images"])
-    seconds = step_seconds(run, packed.frames, packed.labels, _start_of(run))
+    seconds = step_seconds(run, packed.frames, packed.labels, _start_of(job, run))
     images = max(1, round(60 * minutes / seconds)) * run.training.batch_size
-    write_json(path, {"minutes": minutes, "localizer": run.name, "images": images})
+    write_json(path, asked | {"images": images})
     return images
 
 
-def _start_of(run: Job) -> Path:
-    """Return the shipped weights that its backbone starts from."""
+def _start_of(job: TrainJob, run: Job) -> Path | None:
+    """Return the weights that its backbone starts from; None to start from scratch."""
+    if job.start is not None:
+        return job.start
+    if run.network.width != SHIPPED_WIDTH:
+        log.info("the backbone starts from scratch: shipped weights are of width %g", SHIPPED_WIDTH)
+        return None
     return shipped_weights_path(backbone_of(run.name, run.network))

@@ -17,6 +17,9 @@ pyrender 0.1.45, its last release, is used as it is installed, but by one subcla
   context of its own, whose end is the end of the first
   (https://github.com/mmatl/pyrender/issues/223). Here scenes and passes share one context.
 
+Its viewer is left out where nobody has loaded it before: it is built on pyglet, which needs X's
+libraries, and does not load on machines without them.
+
 With NumPy 2 pyrender cannot compute the extent of a scene
 (https://github.com/mmatl/pyrender/issues/288). Nothing here asks for it: the far plane is given,
 and there are no shadows.
@@ -26,7 +29,10 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -47,6 +53,23 @@ from synfeal.render.base import (
     floor_share,
     thresholded,
 )
+
+
+@contextmanager
+def _without_viewer() -> Iterator[None]:
+    """Let pyrender be loaded without the module of its viewer, unless that is loaded already."""
+    name = "pyrender.viewer"
+    if name in sys.modules:
+        yield
+        return
+    left_out = ModuleType(name, "Left out by synfeal.render.pyrender_backend.")
+    left_out.Viewer = None  # type: ignore[attr-defined]
+    sys.modules[name] = left_out
+    try:
+        yield
+    finally:
+        del sys.modules[name]
+
 
 # Read by PyOpenGL when it is loaded, and the way pyrender is told how to draw without a display
 # (https://pyrender.readthedocs.io/en/latest/examples/offscreen.html).

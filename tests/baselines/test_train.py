@@ -14,8 +14,9 @@ import pytest
 import torch
 from PIL import Image
 
+from baselines.localizers.backbones.shipped import shipped_weights_path
 from baselines.training.own_frames import FrameRange, pack_own_frames, read_own_frames
-from baselines.training.train import NETWORK, TrainJob, train
+from baselines.training.train import NETWORK, TrainJob, _network, train
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.cli import main
 from synfeal.dataset.packed import fit_frame
@@ -304,3 +305,64 @@ def test_data_sets_of_two_cameras_do_not_fit(calm, tmp_path, capsys):
     (other / "manifest.json").write_text(json.dumps(manifest))
     line = refused(capsys, "train", calm, other, "--out", tmp_path / "out", "--images", 64)
     assert "other/manifest.json: camera: is another than that of" in line
+
+
+def test_the_network_has_the_shape_asked_for_and_localize_knows_it(photographs, tmp_path, capsys):
+    out, poses = tmp_path / "trained", tmp_path / "poses.csv"
+    shape = ["--input-px", 48, "--width", 0.125, "--batch", 16]
+    given = ["train", photographs, "--out", out, "--images", 64, "--device", "cpu", *shape]
+    assert main([str(argument) for argument in given]) == 0
+    settings = json.loads((out / "training.json").read_text())["settings"]
+    assert (settings["input_px"], settings["width"], settings["batch"]) == (48, 0.125, 16)
+    network = described(out / "model.pt")["network"]
+    assert (network["input_px"], network["width"], network["view"]) == (48, 0.125, "whole")
+    capsys.readouterr()
+    localizing = ["localize", out / "model.pt", photographs, "--out", poses, "--device", "cpu"]
+    assert main([str(argument) for argument in localizing]) == 0
+    assert "48 x 48 pixels" in capsys.readouterr().out
+
+
+def test_the_shape_follows_the_device_unless_it_is_given():
+    gpu, cpu = torch.device("cuda"), torch.device("cpu")
+    job = TrainJob(datasets=(), out=Path("out"))
+    assert _network(job, cpu) == NETWORK
+    assert (_network(job, gpu).input_px, _network(job, gpu).width) == (224, 1.0)
+    half = TrainJob(datasets=(), out=Path("out"), width=0.5)
+    assert (_network(half, gpu).input_px, _network(half, gpu).width) == (224, 0.5)
+
+
+def test_a_backbone_may_start_from_a_file(photographs, tmp_path):
+    start = shipped_weights_path("googlenet")
+    named = run(tmp_path / "named", photographs, images=64, start=start)
+    shipped = run(tmp_path / "shipped", photographs, images=64)
+    scratch = run(tmp_path / "scratch", photographs, images=64, start=None, width=0.125)
+    assert named.model.read_bytes() == shipped.model.read_bytes()
+    assert described(scratch.model)["network"]["width"] == 0.125
+
+
+def test_an_earlier_record_is_of_the_network_that_there_was(photographs, undisturbed, tmp_path):
+    out = Path(shutil.copytree(undisturbed, tmp_path / "out"))
+    record = json.loads((out / "training.json").read_text())
+    for key in ("input_px", "width", "batch", "start"):
+        del record["settings"][key]
+    (out / "training.json").write_text(json.dumps(record))
+    assert run(out, photographs).finished_before
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--input-px", 8], "--input-px: "),
+        (["--width", 2], "--width: "),
+        (["--batch", 0], "--batch: must be at least 1"),
+        (["--batch", 100_000_000], "lower --batch, --input-px or --width"),
+        (["--start", "nowhere.pt"], "--start: nowhere.pt is no file"),
+    ],
+)
+def test_a_network_that_cannot_be_is_told_before_anything_is_written(
+    photographs, tmp_path, capsys, options, said
+):
+    given = ["train", photographs, "--out", tmp_path / "out", "--device", "cpu", *options]
+    assert main([str(argument) for argument in given]) == 1
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -216,3 +216,19 @@ def test_parts_with_too_many_vertices_are_drawn_in_pieces():
         corners = np.concatenate([getattr(piece, name)[piece.faces] for piece in split])
         np.testing.assert_array_equal(corners, whole[faces])
     assert list(pieces(part, most_vertices=300)) == [part]
+
+
+WITHOUT_X = """
+import sys
+sys.modules["pyglet"] = None  # as where X's libraries are missing: it does not load
+from synfeal.render.choose import why_not
+failure = why_not("pyrender")
+assert failure is None, failure
+assert "pyrender.viewer" not in sys.modules
+"""
+
+
+def test_pyrender_draws_without_the_libraries_of_its_viewer():
+    command = [sys.executable, "-c", WITHOUT_X]
+    process = subprocess.run(command, env=os.environ, check=False, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
