@@ -128,7 +128,14 @@ def localize_by_map(arguments: argparse.Namespace) -> None:
             " camera? poses are off by about as large a share of the distance to what is seen",
             done.focal_ratio,
         )
-    if done.n_found == 0:
+    if done.n_ambiguous:
+        log.warning(
+            "%d of %d photographs are ambiguous: another place of the map looks like what they"
+            " show, so they get no pose; take photographs that show more, or something unique",
+            done.n_ambiguous,
+            done.n_images,
+        )
+    if done.n_found == 0 and not done.n_ambiguous:
         log.warning("is it another place, or is the focal length of the photographs wrong?")
     print(f"{arguments.model}: {done.n_frames} frames, {done.n_points} features")
     print(f"{out}: {found_text(done)}")

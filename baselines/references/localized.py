@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 World = Literal["sequence", "mesh"]
 
 HEADER = (IMAGE, *COLUMNS[2:], *SUPPORT)
-FOUND, NOT_FOUND = "localized", "not localized"
+FOUND, NOT_FOUND, AMBIGUOUS = "localized", "not localized", "ambiguous"
 # So many photographs tell whether their focal length is right.
 FEWEST_RATIOS = 5
 DECIMALS = 6  # micrometres
@@ -46,6 +46,7 @@ class LocalizedInMap(NamedTuple):
     Attributes:
         n_images: Photographs.
         n_found: Those that were localized.
+        n_ambiguous: Those of which several places look alike, which have no pose.
         inliers: Median number of features that agree with the pose, of those localized; NaN where
             none was.
         focal_ratio: Median over those localized of the focal length that fits best over the one
@@ -58,6 +59,7 @@ class LocalizedInMap(NamedTuple):
 
     n_images: int
     n_found: int
+    n_ambiguous: int
     inliers: float
     focal_ratio: float
     world: World | None
@@ -111,10 +113,13 @@ def localize_in_map(
         find = partial(_find, Finder(place, seed), redrawn, least_confidence, camera)
         answers = _find_all(find, pictures, taken_s)
     poses = np.array([answer.world_from_cam for answer in answers])
-    found = np.array([a.support.confidence >= least_confidence for a in answers])
+    sure = np.array([a.support.confidence >= least_confidence for a in answers])
+    ambiguous = sure & np.array([a.is_ambiguous for a in answers])
+    found = sure & ~ambiguous
     if world == "sequence" and place.sequence_from_world is not None:
         poses = place.sequence_from_world @ poses
-    _write(out, pictures, poses, found, answers)
+    status = np.select([found, ambiguous], [FOUND, AMBIGUOUS], default=NOT_FOUND)
+    _write(out, pictures, poses, status, answers)
     kept = [answer for answer, good in zip(answers, found, strict=True) if good]
     counts = [answer.support.inliers for answer in kept]
     ratios = np.array([answer.focal_ratio for answer in kept])
@@ -122,6 +127,7 @@ def localize_in_map(
     return LocalizedInMap(
         n_images=len(pictures),
         n_found=int(found.sum()),
+        n_ambiguous=int(ambiguous.sum()),
         inliers=float(median(counts)) if counts else float("nan"),
         focal_ratio=float(np.median(ratios)) if len(ratios) >= FEWEST_RATIOS else float("nan"),
         world=None if place.sequence_from_world is None else world,
@@ -164,7 +170,8 @@ def _find(
         )
     photograph = finder.look_at(image, calibration)
     answer = finder.find(photograph)
-    if redrawn is None or answer.support.confidence < least_confidence:
+    refused = answer.support.confidence < least_confidence or answer.is_ambiguous
+    if redrawn is None or refused:
         return answer
     return redrawn.refine(photograph, answer)
 
@@ -191,17 +198,18 @@ def _write(
     out: Path,
     pictures: Sequence[Path],
     poses: Array,
-    found: NDArray[np.bool_],
+    status: NDArray[np.str_],
     answers: Sequence[Answer],
 ) -> None:
+    found = status == FOUND
     values = np.full((len(poses), 7), np.nan)
     values[found, :3] = poses[found, :3, 3]
     if found.any():
         values[found, 3:] = quat_wxyz_of(poses[found])
     frame = pd.DataFrame(values.round(DECIMALS), columns=list(COLUMNS[2:]))
     frame.insert(0, IMAGE, pd.Series([str(path) for path in pictures], dtype=object))
-    status, inliers, confidence = SUPPORT
-    frame[status] = np.where(found, FOUND, NOT_FOUND)
+    status_column, inliers, confidence = SUPPORT
+    frame[status_column] = status
     frame[inliers] = [answer.support.inliers for answer in answers]
     frame[confidence] = [round(answer.support.confidence, DECIMALS) for answer in answers]
     with writing_to(out, lambda: "choose another file with --out"):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from baselines.references.arrays import most_alike
-from baselines.references.confidence import NO_SUPPORT, Support, support_of
+from baselines.references.confidence import LEAST_CONFIDENCE, NO_SUPPORT, Support, support_of
 from baselines.references.correspondences import mutual_matches
 from baselines.references.features import roots_of
 from baselines.references.mapped import VIEW_PX, StructureMap, detect, detector
@@ -25,13 +25,19 @@ from synfeal.camera.calibration import Calibration
 from synfeal.camera.distortion import distort, undistort
 from synfeal.camera.projection import cell_pixels, normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
-from synfeal.geometry.poses import inverse
+from synfeal.geometry.poses import inverse, pose_error
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-RETRIEVED = 20  # frames that a photograph is matched with, each time
+RETRIEVED = 20  # frames that a photograph is matched with, once its pose is nearly known
+# Those that look most alike: of a place that repeats itself, frames of each repeat must be there.
+FIRST_RETRIEVED = 40
+# Share of the inliers that a pose elsewhere has, from which nothing tells which of both is right.
+ALIKE = 0.8
+MOST_PLACES = 5  # that may look like what a photograph shows
+APART_M, APART_RAD = 0.3, np.radians(10.0)  # between poses of different places
 RATIO = 0.85
 MAX_ERROR_PX = 6.0  # in the map's frames; poses of a scan contradict each other by some pixels
 # Matches that miss by this many times the largest error of an inlier may miss because the focal
@@ -70,11 +76,32 @@ class Answer(NamedTuple):
         focal_ratio: Focal length that fits the matches best, over the one that was given; NaN where
             no pose was found. Of one photograph it means little, for a step back looks much like
             a shorter lens; of many the median does.
+        rival: The best pose elsewhere, where there is any: places repeat themselves.
     """
 
     world_from_cam: Array
     support: Support
     focal_ratio: float
+    rival: Rival | None = None
+
+    @property
+    def is_ambiguous(self) -> bool:
+        """Tell whether another place explains the photograph about as well."""
+        if self.rival is None:
+            return False
+        return self.rival.inliers >= ALIKE * self.support.inliers
+
+
+class Rival(NamedTuple):
+    """The best pose at another place.
+
+    Attributes:
+        world_from_cam: Pose (4, 4) in the world of the map.
+        inliers: Features of the photograph that agree with it.
+    """
+
+    world_from_cam: Array
+    inliers: int
 
 
 NOT_FOUND = Answer(np.full((4, 4), np.nan), NO_SUPPORT, float("nan"))
@@ -128,18 +155,53 @@ class Finder:
 
     def find(self, photograph: Photograph) -> Answer:
         """Estimate where a photograph was taken."""
-        best = self._against(photograph, self.alike(photograph))
-        if best is None:
+        first = self._against(photograph, self.alike(photograph))
+        if first is None:
             return NOT_FOUND
-        second = self._against(photograph, self.nearest(best.world_from_cam))
-        if second is not None and second.support.log10_nfa < best.support.log10_nfa:
-            best = second
-        return Answer(best.world_from_cam, best.support, self._focal_ratio(best))
+        attempts = [self._settled(photograph, attempt) for attempt in self._places(first)]
+        best = max(attempts, key=lambda attempt: attempt.support.inliers)
+        elsewhere = [
+            attempt
+            for attempt in attempts
+            if _are_apart(attempt.world_from_cam, best.world_from_cam)
+        ]
+        rival = max(elsewhere, key=lambda attempt: attempt.support.inliers, default=None)
+        return Answer(
+            world_from_cam=best.world_from_cam,
+            support=best.support,
+            focal_ratio=self._focal_ratio(best),
+            rival=None if rival is None else Rival(rival.world_from_cam, rival.support.inliers),
+        )
+
+    def _settled(self, photograph: Photograph, attempt: _Attempt) -> _Attempt:
+        """Match the frames that were taken nearest to a pose too, and keep the better one."""
+        second = self._against(photograph, self.nearest(attempt.world_from_cam))
+        if second is None or _are_apart(second.world_from_cam, attempt.world_from_cam):
+            return attempt
+        better = second.support.log10_nfa < attempt.support.log10_nfa
+        return second if better else attempt
+
+    def _places(self, first: _Attempt) -> list[_Attempt]:
+        """List the first pose and those that the rest of its matches agree on, elsewhere.
+
+        What is seen from one place matches features of all places that look like it.
+        """
+        found = [first]
+        left = ~first.inlier
+        while len(found) < MOST_PLACES:
+            other = self._agreed(first.own[left], first.pixel[left], first.point_m[left])
+            if other is None or other.support.confidence < LEAST_CONFIDENCE:
+                break
+            rows = np.flatnonzero(left)
+            left[rows[other.inlier]] = False
+            if all(_are_apart(other.world_from_cam, known.world_from_cam) for known in found):
+                found.append(other)
+        return found
 
     def alike(self, photograph: Photograph) -> Rows:
         """List the frames of the map that look most alike, best first."""
         vector = self._place.vlad.describe(photograph.view[None])
-        return most_alike(self._place.vectors, vector, RETRIEVED).ravel()
+        return most_alike(self._place.vectors, vector, FIRST_RETRIEVED).ravel()
 
     def nearest(self, world_from_cam: Array) -> Rows:
         """List the frames of the map that were taken nearest to a pose (4, 4), best first."""
@@ -162,6 +224,16 @@ class Finder:
         matched = np.concatenate(own)
         pixel = photograph.slope[matched] * self._focal_px
         point_m = self._place.point_m[np.concatenate(feature)]
+        return self._agreed(matched, pixel, point_m)
+
+    def _agreed(self, own: Rows, pixel: Array, point_m: Array) -> _Attempt | None:
+        """Estimate the pose that most matches agree with.
+
+        Args:
+            own: Feature of the photograph (m,) of each match.
+            pixel: Its position (m, 2) from the principal point.
+            point_m: Where it was matched to (m, 3), in the world of the map.
+        """
         found = supported_pose(
             pixel=pixel,
             point_m=point_m,
@@ -174,12 +246,12 @@ class Finder:
         camera = self._place.camera
         support = support_of(
             pixel=pixel,
-            own=matched,
+            own=own,
             inlier=found.inlier,
             size=(camera.width, camera.height),
             max_error_px=MAX_ERROR_PX,
         )
-        return _Attempt(found.world_from_cam, support, pixel, point_m)
+        return _Attempt(found.world_from_cam, support, own, pixel, point_m, found.inlier)
 
     def _focal_ratio(self, attempt: _Attempt) -> float:
         """Estimate the best focal length over the given one, from matches that nearly agree."""
@@ -199,12 +271,20 @@ class Finder:
 
 
 class _Attempt(NamedTuple):
-    """A pose, its support, and the matches (m, 2), (m, 3) it was found from."""
+    """A pose, its support, and the matches (m,) it was found from."""
 
     world_from_cam: Array
     support: Support
+    own: Rows
     pixel: Array
     point_m: Array
+    inlier: NDArray[np.bool_]
+
+
+def _are_apart(world_from_a: Array, world_from_b: Array) -> bool:
+    """Tell whether two poses (4, 4) are of two places, not one found twice."""
+    distance_m, angle_rad = pose_error(world_from_a, world_from_b)
+    return bool(distance_m > APART_M or angle_rad > APART_RAD)
 
 
 def _sampled(pixels: NDArray[np.uint8], looks: Array) -> NDArray[np.uint8]:
