@@ -57,7 +57,7 @@ archive: $(INSTALLED)  ## PROFILE's report, figures, and all that its tables are
 
 plan: smoke  ## what plans are worth: predictions beside measured runs (results/benchmarks)
 	mkdir -p results/benchmarks/smoke && cp results/smoke/benchmarks.csv results/benchmarks/smoke/
-	$(BIN)/synfeal plan --measured results/benchmarks/smoke results/published/night \
+	$(BIN)/synfeal cost --measured results/benchmarks/smoke results/published/night \
 	  --compare results/published/mini --csv results/benchmarks/plan_check.csv
 
 test: check  ## static checks and the test suite, but for what is slow, on CORES cores

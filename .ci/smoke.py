@@ -18,7 +18,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 COLLECT = (
-    "collect --mesh room.glb --up-axis z --frames 60 --test-frames 16 --width 240 --height 180"
+    "collect room.glb --up-axis z --frames 60 --test-frames 16 --width 240 --height 180"
     " --spacing 0.1 --depth --out set"
 )
 SIMULATOR = (

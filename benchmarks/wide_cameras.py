@@ -90,7 +90,7 @@ def main() -> None:
     for path in args.meshes:
         mesh = load_mesh(path)
         caster = RayCaster(*mesh.merged())
-        table = plan(path, args.frames, mode="random", min_clearance=0.3)
+        table = plan(path, args.frames, mode="random", min_clearance_m=0.3)
         poses, strip = table.world_from_cam, []
         for name, camera in CAMERAS.items():
             began = time.process_time()

@@ -1,6 +1,6 @@
 """Pairs of images with dense correspondences, for training a matcher with PyTorch.
 
-    synfeal collect --mesh scan.glb --frames 2000 --depth --out mydata
+    synfeal collect scan.glb --frames 2000 --depth --out mydata
     synfeal pairs mydata --min-overlap 0.2 --max-overlap 0.8 --per-frame 10 --out mydata-pairs
     python examples/matching_pairs.py mydata mydata-pairs
 

@@ -1,22 +1,41 @@
-"""Commands about runs of the workflow: ``synfeal plan``, ``run`` and ``compare``."""
+"""Commands about runs of the workflow: ``synfeal cost``, ``profile``, ``run``, ``compare``."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from synfeal.cli.options import command, option
+from synfeal.cli import meshes
+from synfeal.cli.options import command, given, option
+from synfeal.config.collect import CollectConfig, LikeConfig
 from synfeal.errors import InputError
 
 SNAKEFILE = Path("Snakefile")
 PLUGINS = Path("workflow/plugins")
 
 
+def _as_cost(typed: Sequence[str]) -> Sequence[str] | None:
+    """Recognise ``synfeal plan`` of the version before, which had no argument without a flag."""
+    is_cost = typed[:1] == ["plan"] and (len(typed) == 1 or typed[1].split("=")[0] in COST_FLAGS)
+    return ["cost", *typed[1:]] if is_cost else None
+
+
+def _as_profile(typed: Sequence[str]) -> Sequence[str] | None:
+    """Recognise ``synfeal collect --print-config`` of the version before."""
+    if typed[:1] != ["collect"] or "--print-config" not in typed:
+        return None
+    return ["profile", *(each for each in typed[1:] if each != "--print-config")]
+
+
+COST_FLAGS = ("--profile", "--cores", "--measured", "--csv", "--compare")
+
+
 @command(
     "predict what a run of a profile costs",
-    "synfeal plan --profile paper --cores 16",
+    "synfeal cost --profile paper --cores 16",
     option("--profile", "a profile of config/, or its .yaml file (mini)", default="mini"),
     option(
         "--cores",
@@ -39,8 +58,9 @@ PLUGINS = Path("workflow/plugins")
         type=Path,
         metavar="RESULTS",
     ),
+    rewriting=_as_cost,
 )
-def plan(arguments: argparse.Namespace) -> None:
+def cost(arguments: argparse.Namespace) -> None:
     """Predict jobs, hours, memory and disk of a run of the workflow before it is started."""
     from reproduction.plan.pace import PUBLISHED
     from reproduction.plan.plan import compare_text, plan_text
@@ -54,6 +74,25 @@ def plan(arguments: argparse.Namespace) -> None:
             raise InputError(f"--cores: must be at least 1, found {min(cores)}")
         text = plan_text(arguments.profile, measured, cores, arguments.csv)
     print(text, end="")
+
+
+@command(
+    "print collect's data set as a profile of the workflow",
+    "synfeal profile scan.glb --frames 95000 --test-frames 5000 --out mydata",
+    *meshes.collect.options,
+    was=meshes.collect.was,
+    rewriting=_as_profile,
+)
+def profile(arguments: argparse.Namespace) -> None:
+    """Print a configuration from which the workflow makes the data set of the same options.
+
+    It runs on several machines if need be, and trains and compares localizers on the data set.
+    """
+    from reproduction.config.collected import configuration_text
+    from synfeal.collection.settings import collect_config
+
+    config, _ = collect_config(given(arguments, CollectConfig, LikeConfig))
+    print(configuration_text(config, arguments.out), end="")
 
 
 @command(
@@ -115,4 +154,4 @@ def compare(arguments: argparse.Namespace) -> None:
         print(f"\n{arguments.out}: compare.md, compare.png and compare.csv")
 
 
-COMMANDS = (plan, run, compare)
+COMMANDS = (cost, profile, run, compare)

@@ -1,26 +1,29 @@
-"""Python interface to the commands of Synfeal.
+"""Python interface to the commands of Synfeal: one function each, with the same words.
 
-Keywords ``**options`` are the options of ``synfeal collect`` with underscores (``spacing=0.1``,
-``yaw=(0, 90)``, ``box=[(x0, x1, y0, y1, z0, z1)]``), with the same bounds and defaults. An
-invalid option raises an :class:`synfeal.errors.InputError` that names it.
+A name in Python ends in its unit, which a flag leaves out: ``spacing_m=0.1`` is ``--spacing 0.1``.
+What cannot be used raises an :class:`synfeal.errors.InputError` that names it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from synfeal.collection.run import CollectJob, with_backend
+from synfeal.camera.projection import Projection
 from synfeal.collection.run import collect as run_collection
-from synfeal.config.collection import SceneConfig
-from synfeal.config.dataset import CameraConfig, DatasetConfig
-from synfeal.config.options import SCENE, dataset_config, options_named, render_configs
+from synfeal.collection.run import plan_training
+from synfeal.collection.settings import collect_config
+from synfeal.config.collect import PlaceConfig, ViewConfig, checked
+from synfeal.config.collection import ClutterConfig, Mode, UpAxis
+from synfeal.config.dataset import Backend, CameraConfig, Detail, Shade
+from synfeal.config.effects import EffectsConfig
+from synfeal.config.renamed import renamed, warn_renamed
 from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.known_camera import camera_of_dataset
@@ -35,7 +38,7 @@ from synfeal.dataset.sequence_listing import (
     RIGHT_DEPTH,
 )
 from synfeal.dataset.split_frames import SplitFrames, read_split_frames
-from synfeal.errors import InputError, read_as
+from synfeal.errors import InputError, SettingError, read_as
 from synfeal.geometry.limits import FARTHEST_M
 from synfeal.geometry.poses import moved_right
 from synfeal.geometry.rigid import refuse_non_rigid
@@ -43,10 +46,8 @@ from synfeal.mesh import load
 from synfeal.mesh.ambient import with_ambient_light
 from synfeal.mesh.instances import Instance, number_instances
 from synfeal.mesh.model import TexturedMesh
-from synfeal.mesh.triangles import merge_vertices
-from synfeal.planning.plan import plan_mesh
 from synfeal.planning.repeat import read_poses
-from synfeal.records.provenance import generator_of
+from synfeal.records.files import read_json
 from synfeal.render import open_renderer
 from synfeal.render.base import Depth, Rgb
 from synfeal.render.surface import Normals, SurfaceImage, SurfaceTable
@@ -54,12 +55,83 @@ from synfeal.render.surface import Normals, SurfaceImage, SurfaceTable
 if TYPE_CHECKING:
     import pandas as pd
 
+    from synfeal.dataset.poses_in import FormatName
     from synfeal.evaluation.run import Evaluation
+    from synfeal.geometry.axes import PosesAre
+    from synfeal.pairing.run import Among
+    from synfeal.scanning.camera import CameraOptions
+    from synfeal.scanning.run import Scan
 
 AnyPath = str | Path
+Bounds = tuple[float, float]
+# Keywords of the version before, by what they are called now.
+EARLIER = {
+    "spacing": "spacing_m",
+    "roll": "roll_deg",
+    "pitch": "pitch_deg",
+    "yaw": "yaw_deg",
+    "min_view_distance": "min_view_distance_m",
+    "min_clearance": "min_clearance_m",
+    "min_path": "min_path_m",
+    "fov": "fov_deg",
+    "stereo": "stereo_m",
+    "background": "background_rgb",
+    "packed": "packed_px",
+    "workers": "cores",
+}
 
 
-def load_mesh(path: AnyPath, up_axis: str = "auto", unit_m: float = 1.0) -> TexturedMesh:
+class ViewOptions(TypedDict, total=False):
+    """Fields of :class:`synfeal.config.collect.ViewConfig`, which has bounds and defaults."""
+
+    camera: AnyPath | CameraConfig | None
+    projection: Projection | None
+    fisheye_k: tuple[float, float, float, float] | None
+    width: int | None
+    height: int | None
+    fov_deg: float | None
+    backend: Backend
+    supersampling: int
+    shade: Shade | None
+    background_rgb: tuple[int, int, int]
+
+
+class CollectOptions(ViewOptions, total=False):
+    """Fields of :class:`synfeal.config.collect.CollectConfig`, and those of ``LikeConfig``."""
+
+    box: Sequence[tuple[float, float, float, float, float, float]]
+    up_axis: UpAxis
+    unit_m: float
+    test_frames: int
+    depth: bool
+    normals: bool
+    masks: bool
+    seed: int
+    spacing_m: float
+    roll_deg: Bounds
+    pitch_deg: Bounds
+    yaw_deg: Bounds
+    min_view_distance_m: float
+    min_seen: float | None
+    min_clearance_m: float | None
+    min_path_m: float
+    test_paths: int | None
+    mode: Mode
+    poses: AnyPath | None
+    stereo_m: float | None
+    detail: Detail
+    effects: AnyPath | Mapping[str, Any] | EffectsConfig | None
+    clutter: AnyPath | Mapping[str, Any] | ClutterConfig | None
+    sequence_frames: int
+    archive: bool
+    packed_px: int | None
+    like: AnyPath | None
+    like_range: tuple[int, int] | None
+    margin_m: float | None
+    angle_margin_deg: float | None
+
+
+def load_mesh(path: AnyPath, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> TexturedMesh:
     """Load a textured mesh into the world frame: z up, metres.
 
     Args:
@@ -67,24 +139,26 @@ def load_mesh(path: AnyPath, up_axis: str = "auto", unit_m: float = 1.0) -> Text
         up_axis: Up axis of the file: ``auto``, ``y`` or ``z``.
         unit_m: Metres per unit of the file.
     """
-    scene = SceneConfig.model_validate(
-        {"source": "mesh", "path": path, "up_axis": up_axis, "unit_m": unit_m}
-    )
-    return load.load_mesh(Path(path), scene.up_axis, scene.unit_m)
+    place = checked(PlaceConfig, {"mesh": path, "up_axis": up_axis, "unit_m": unit_m})
+    return load.load_mesh(place.mesh, place.up_axis, place.unit_m)
 
 
 class Renderer:
-    """Renderer of unlit images of a mesh; a context manager.
+    """Renderer of unlit images of a mesh; a context manager."""
 
-    Keywords: ``camera``, ``width``, ``height``, ``fov``, ``projection``, ``fisheye_k``,
-    ``backend``, ``supersampling``, ``background``, ``shade``.
-    """
+    @renamed(**EARLIER)
+    def __init__(self, mesh: TexturedMesh, **options: Unpack[ViewOptions]) -> None:
+        """Open a renderer.
 
-    def __init__(self, mesh: TexturedMesh, **options: Any) -> None:
-        camera, render = render_configs(options)
-        lit = with_ambient_light(mesh) if render.shade == "ambient" else mesh
-        self._mesh, self._opened = mesh, open_renderer(lit, camera, render)
-        self.camera: CameraConfig = camera
+        Args:
+            mesh: What is drawn.
+            options: Camera and drawing, with the bounds and defaults of
+                :class:`synfeal.config.collect.ViewConfig`.
+        """
+        settings = checked(ViewConfig, options)
+        lit = with_ambient_light(mesh) if settings.shade == "ambient" else mesh
+        self._mesh, self._opened = mesh, open_renderer(lit, settings.view, settings.render)
+        self.camera: CameraConfig = settings.view
 
     def render(self, world_from_cam: NDArray[np.float64]) -> Rgb:
         """Return colours (H, W, 3), uint8, seen from a camera pose (4, 4).
@@ -142,46 +216,67 @@ def _rigid(world_from_cam: ArrayLike) -> NDArray[np.float64]:
     return pose
 
 
-def plan(mesh: AnyPath, frames: int, **options: Any) -> PoseTable:
-    """Return the training poses that :func:`collect` would use with the same options."""
-    config = _config(mesh, frames, options)
-    scene = config.scenes[SCENE]
-    loaded = load_mesh(mesh, scene.up_axis, scene.unit_m)
-    triangles = merge_vertices(*loaded.merged())
-    rng = generator_of(config.seed, "plan", SCENE, "train")
-    with options_named():
-        return plan_mesh(triangles, str(mesh), scene, config.collection, frames, rng, "train")
+@renamed(**EARLIER)
+def plan(mesh: AnyPath, frames: int, **options: Unpack[CollectOptions]) -> PoseTable:
+    """Return the training poses that :func:`collect` would use with the same options.
+
+    Args:
+        mesh: Mesh file.
+        frames: Number of poses.
+        options: Options of :func:`collect`.
+    """
+    return plan_training(collect_config({"mesh": mesh, "frames": frames, **options})[0])
 
 
+@renamed(**EARLIER)
 def collect(
-    mesh: AnyPath,
-    out: AnyPath,
-    frames: int,
-    *,
-    workers: int = 1,
-    packed: int | None = None,
-    **options: Any,
+    mesh: AnyPath, out: AnyPath, frames: int, *, cores: int = 1, **options: Unpack[CollectOptions]
 ) -> Dataset:
-    """Collect a data set, or resume an interrupted one, as ``synfeal collect`` does.
+    """Collect a data set, or resume an interrupted one.
 
     Args:
         mesh: Mesh file.
         out: Directory of the data set.
         frames: Number of training frames.
-        workers: Number of rendering processes.
-        packed: Side in pixels of packed frames to write as well; None for none.
-        options: Options of ``synfeal collect``.
+        cores: Number of rendering processes.
+        options: Fields of :class:`synfeal.config.collect.CollectConfig`, with its bounds and
+            defaults, and of :class:`synfeal.config.collect.LikeConfig`.
+
+    Raises:
+        InputError: An option, the mesh or the directory cannot be used.
     """
-    config = _config(mesh, frames, options, Path(out))
-    with options_named():
-        run_collection(CollectJob(with_backend(config), packed, Path(out)), workers)
+    config, _ = collect_config({"mesh": mesh, "frames": frames, **options})
+    run_collection(config, Path(out), cores)
     return open_dataset(out)
 
 
-def _config(
-    mesh: AnyPath, frames: int, options: dict[str, Any], out: Path | None = None
-) -> DatasetConfig:
-    return dataset_config({"test_frames": 0, "mesh": mesh, "frames": frames, **options}, out)
+def inspect(
+    mesh: AnyPath,
+    out: AnyPath | None = None,
+    *,
+    box: Sequence[tuple[float, float, float, float, float, float]] = (),
+    up_axis: UpAxis = "auto",
+    unit_m: float | None = None,
+) -> dict[str, Any]:
+    """Show what a mesh is and where cameras can be in it, before anything is collected.
+
+    Args:
+        mesh: Mesh file.
+        out: Directory for numbers, picture and page; None for ``<name of the mesh>-inspect``.
+        box: Where camera centres may be, metres; none: the mesh's bounds.
+        up_axis: Up axis of the file: ``auto``, ``y`` or ``z``.
+        unit_m: Metres per unit of the file; None to find one that makes a room of the mesh.
+
+    Returns:
+        The numbers, as in ``inspect.json``; ``collect`` holds a suggested command, if there is one.
+    """
+    from synfeal.inspection.run import OUTPUTS, inspect_mesh
+
+    place = checked(PlaceConfig, {"mesh": mesh, "box": box, "up_axis": up_axis, "unit_m": unit_m})
+    folder = Path(f"{place.mesh.stem}-inspect") if out is None else Path(out)
+    inspect_mesh(place.scene, folder, unit_m is not None)
+    found: dict[str, Any] = read_json(folder / OUTPUTS[0])
+    return found
 
 
 @dataclass(frozen=True)
@@ -264,28 +359,70 @@ def _layer(listed: SplitFrames, kind: str) -> tuple[FrameFile, ...]:
     return tuple(listed.files(kind)) if there else ()
 
 
-def find_pairs(path: AnyPath, out: AnyPath, **settings: Any) -> pd.DataFrame:
-    """Compare the frames of a data set, as ``synfeal pairs`` does, and return the table of pairs.
+@renamed(every="stride", camera_file="camera")
+def pairs(
+    dataset: AnyPath,
+    out: AnyPath | None = None,
+    *,
+    among: Among = "each",
+    stride: int = 1,
+    min_overlap: float = 0.1,
+    max_overlap: float = 1.0,
+    per_frame: int | None = None,
+    tolerance: float = 0.01,
+    grid: tuple[int, int] = (32, 24),
+    flow: bool = False,
+    camera: AnyPath | None = None,
+) -> pd.DataFrame:
+    """Find the pairs of frames that see the same surfaces, and return their table.
 
     Args:
-        path: Data set with depth.
-        out: Directory to create.
-        settings: Fields of :class:`synfeal.pairing.run.PairsJob` and of
-            :class:`synfeal.pairing.choose.Choice`: ``among``, ``per_frame`` and so on.
+        dataset: Data set with depth.
+        out: Directory to create; None for ``<dataset>-pairs`` beside the data set.
+        among: Frames to pair: within ``each`` split, in ``train`` or ``test`` alone, or ``all``
+            with all.
+        stride: Take every such frame of each sequence.
+        min_overlap: Least overlap of a pair, 0 to 1.
+        max_overlap: Greatest overlap of a pair, 0 to 1.
+        per_frame: Keep only this many pairs per frame, by overlap; None for all.
+        tolerance: Largest relative difference of depth at which a point counts as visible.
+        grid: Columns and rows of a frame's points that are looked up in the others.
+        flow: Write optical flow of each pair, both ways.
+        camera: Calibration file, in place of the camera of the manifest.
     """
     from synfeal.pairing.choose import Choice
-    from synfeal.pairing.run import PairsJob
-    from synfeal.pairing.run import find_pairs as find
+    from synfeal.pairing.run import PairsJob, find_pairs
 
-    bounds = {f.name: settings.pop(f.name) for f in fields(Choice) if f.name in settings}
-    return find(PairsJob(Path(path), Path(out), choice=Choice(**bounds), **settings)).table
+    whole = Path(dataset).resolve()
+    job = PairsJob(
+        dataset=Path(dataset),
+        out=whole.with_name(f"{whole.name}-pairs") if out is None else Path(out),
+        among=among,
+        choice=Choice(min_overlap, max_overlap, per_frame),
+        every=stride,
+        tolerance=tolerance,
+        grid=grid,
+        flow=flow,
+        camera_file=None if camera is None else Path(camera),
+    )
+    return find_pairs(job).table
 
 
-def validate(path: AnyPath, camera: AnyPath | None = None, every_pair: bool = False) -> list[str]:
-    """Check a data set, as ``synfeal validate`` does.
+def find_pairs(path: AnyPath, out: AnyPath, **settings: Any) -> pd.DataFrame:
+    """Call :func:`pairs` by the name it had in the version before."""
+    warn_renamed("find_pairs", "pairs")
+    table: pd.DataFrame = pairs(path, out, **settings)
+    return table
+
+
+@renamed(path="dataset")
+def validate(
+    dataset: AnyPath, *, camera: AnyPath | None = None, every_pair: bool = False
+) -> list[str]:
+    """Check files, poses, splits, hashes and geometry of a data set.
 
     Args:
-        path: The data set.
+        dataset: The data set.
         camera: Calibration file, for a data set without a manifest or with another camera.
         every_pair: Compare all pairs of frames, not a sample of a large set.
 
@@ -295,18 +432,217 @@ def validate(path: AnyPath, camera: AnyPath | None = None, every_pair: bool = Fa
     from synfeal.validation.run import error_lines
     from synfeal.validation.run import validate as run_checks
 
-    return error_lines(run_checks(Path(path), Path(camera) if camera else None, every_pair))
+    return error_lines(run_checks(Path(dataset), Path(camera) if camera else None, every_pair))
 
 
-def evaluate(path: AnyPath, poses: AnyPath, **settings: Any) -> Evaluation:
-    """Score poses against a data set, as ``synfeal evaluate`` does.
+@renamed(path="dataset", file_format="format")
+def evaluate(
+    dataset: AnyPath,
+    poses: AnyPath,
+    *,
+    out: AnyPath | None = None,
+    format: FormatName | None = None,  # noqa: A002 (the word of the command)
+    split: Literal["test", "train", "all"] = "test",
+    align: Literal["none", "se3", "sim3"] = "none",
+    labels: AnyPath | None = None,
+    convention: str | None = None,
+    rate_hz: float | None = None,
+    max_difference_s: float = 0.01,
+    offset_s: float = 0.0,
+    camera: AnyPath | None = None,
+) -> Evaluation:
+    """Score poses of any common format against a data set.
 
     Args:
-        path: Data set, or a file of poses as the reference.
+        dataset: Data set, or a file of poses as the reference.
         poses: File of the poses to score.
-        settings: Fields of :class:`synfeal.evaluation.run.Settings`.
+        out: Directory for ``scores.csv``, ``errors.csv`` and ``errors.png``; None to write none.
+        format: Format of the poses; None to recognise it by their content.
+        split: Frames to score.
+        align: Transformation that first aligns all poses, as a whole, to those of the data set.
+        labels: Second reference poses, in any format.
+        convention: Direction and order of the poses, such as ``cam_from_world-wxyz``; None for that
+            of their format.
+        rate_hz: With TUM and EuRoC: frames per second; None for 30.
+        max_difference_s: Between two files of poses: largest difference of two times of a pair.
+        offset_s: Between two files of poses: what is added to the times of ``poses``.
+        camera: Calibration file, in place of the camera of the manifest.
     """
     from synfeal.evaluation.run import Settings
     from synfeal.evaluation.run import evaluate as score
+    from synfeal.evaluation.text import FILES, write_files
+    from synfeal.records.files import refuse_foreign
 
-    return score(Path(path), Path(poses), Settings(**settings))
+    if out is not None:
+        refuse_foreign(Path(out), FILES, "an evaluation")
+    settings = Settings(
+        split=split,
+        align=align,
+        convention=convention,
+        rate_hz=rate_hz,
+        labels=None if labels is None else Path(labels),
+        camera=None if camera is None else Path(camera),
+        file_format=format,
+        most_apart_s=max_difference_s,
+        offset_s=offset_s,
+    )
+    found = score(Path(dataset), Path(poses), settings)
+    if out is not None:
+        write_files([Path(out) / name for name in FILES], f"{poses} on {dataset}", found)
+    return found
+
+
+def export(
+    dataset: AnyPath,
+    out: AnyPath,
+    *,
+    to: str,
+    copy: bool = False,
+    camera: AnyPath | None = None,
+) -> int:
+    """Write a data set in the format of another program.
+
+    Args:
+        dataset: The data set.
+        out: Directory to create.
+        to: Format: ``ace``, ``colmap``, ``hloc``, ``mstransformer``, ``nerfstudio``, ``rosbag`` or
+            ``tum``.
+        copy: Copy colour images instead of linking to them.
+        camera: Calibration file, in place of the camera of the manifest.
+
+    Returns:
+        The number of frames.
+    """
+    from synfeal.exporting.run import export as write
+
+    return write(Path(dataset), to, Path(out), copy, None if camera is None else Path(camera))
+
+
+def preview(
+    datasets: AnyPath | Sequence[AnyPath],
+    out: AnyPath | None = None,
+    *,
+    frames: int = 120,
+    fps: float = 12.0,
+    split: Literal["train", "test"] = "train",
+    show: Sequence[str] = ("color",),
+) -> int:
+    """Write a GIF or MP4 of the first frames of data sets, side by side.
+
+    Args:
+        datasets: One data set or several.
+        out: GIF or MP4 to write; None for ``preview.gif`` in the first data set.
+        frames: Number of frames to show, from the first.
+        fps: Frames per second, at most 50.
+        split: Split to show.
+        show: Layers to show side by side: ``color``, ``depth``, ``normals``, ``masks``, ``right``,
+            ``right-depth``.
+
+    Returns:
+        The number of frames shown.
+    """
+    from synfeal.dataset.preview import write_preview
+
+    several = [datasets] if isinstance(datasets, str | Path) else list(datasets)
+    folders = [Path(each) for each in several]
+    file = folders[0] / "preview.gif" if out is None else Path(out)
+    return write_preview(folders, file, frames, fps, split, show)
+
+
+def scan(
+    sequence: AnyPath,
+    out: AnyPath,
+    *,
+    preset: str | None = None,
+    color_camera: AnyPath | None = None,
+    depth_camera: AnyPath | None = None,
+    color_focal_px: float | None = None,
+    depth_focal_px: float | None = None,
+    depth_from_color: tuple[float, float, float, float, float, float] | None = None,
+    depth_scale: float | None = None,
+    convention: PosesAre = "world_from_cam",
+    range: tuple[int, int] | None = None,  # noqa: A002 (the word of the command)
+    stride: int = 2,
+    voxel_m: float = 0.01,
+    max_depth_m: float = 4.0,
+    min_piece_m2: float = 0.02,
+    gravity: tuple[float, float, float] | None = None,
+    keep_axes: bool = False,
+    keep_calibration: bool = False,
+) -> Scan:
+    """Fuse posed RGB-D frames into one upright mesh, z up, in metres.
+
+    Args:
+        sequence: 7-Scenes frames, a folder of ``seq-01``, ..., or a TUM RGB-D sequence.
+        out: ``.glb`` to write; ``.json`` and ``.png`` come beside it.
+        preset: Known calibrations of colour and depth, such as ``7scenes``.
+        color_camera: Calibration of the photographs.
+        depth_camera: Calibration of the depth images; None for that of colour.
+        color_focal_px: Focal length in place of a file.
+        depth_focal_px: The same for depth.
+        depth_from_color: Transform from the colour to the depth camera: rotation vector, degrees,
+            and translation, metres.
+        depth_scale: Stored value of a depth of 1 m.
+        convention: Direction of the poses, or ``opengl`` for ``world_from_cam`` of cameras that
+            look along -z, y up.
+        range: First frame and one past the last; None for all.
+        stride: Fuse every such frame.
+        voxel_m: Edge of a voxel.
+        max_depth_m: Depth beyond is ignored.
+        min_piece_m2: Loose pieces with less surface are dropped.
+        gravity: Direction of gravity in the world of the poses; None to find it from the scene.
+        keep_axes: Keep the axes of the poses' world.
+        keep_calibration: Use the calibration of the photographs as given, without fitting it.
+    """
+    from synfeal.scanning.run import ScanJob
+    from synfeal.scanning.run import scan as fuse
+
+    if gravity is not None and keep_axes:
+        raise SettingError("keep_axes", "contradicts gravity; leave one of the two out")
+    start, stop = range or (0, None)
+    job = ScanJob(
+        sequence=Path(sequence),
+        out=Path(out),
+        cameras=rgbd_cameras(
+            preset,
+            color_camera,
+            depth_camera,
+            color_focal_px,
+            depth_focal_px,
+            depth_from_color,
+            depth_scale,
+        ),
+        start=start,
+        stop=stop,
+        stride=stride,
+        voxel_m=voxel_m,
+        max_depth_m=max_depth_m,
+        min_piece_m2=min_piece_m2,
+        poses_are=convention,
+        gravity=gravity or ("keep" if keep_axes else "find"),
+        keep_calibration=keep_calibration,
+    )
+    return fuse(job)
+
+
+def rgbd_cameras(
+    preset: str | None,
+    color_camera: AnyPath | None,
+    depth_camera: AnyPath | None,
+    color_focal_px: float | None,
+    depth_focal_px: float | None,
+    depth_from_color: tuple[float, float, float, float, float, float] | None,
+    depth_scale: float | None,
+) -> CameraOptions:
+    """Gather what is known of the cameras of RGB-D frames; see :func:`scan` for the arguments."""
+    from synfeal.scanning.camera import CameraOptions
+
+    return CameraOptions(
+        preset=preset,
+        color_camera=None if color_camera is None else Path(color_camera),
+        depth_camera=None if depth_camera is None else Path(depth_camera),
+        color_focal_px=color_focal_px,
+        depth_focal_px=depth_focal_px,
+        depth_from_color=depth_from_color,
+        depth_units_per_m=depth_scale,
+    )

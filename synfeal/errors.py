@@ -40,6 +40,21 @@ class InputError(Exception):
         super().__init__(line)
 
 
+class SettingError(InputError):
+    """A setting that cannot be used, by the name it has in Python.
+
+    The command line puts the option made of that name in its place.
+
+    Attributes:
+        field: Name of the setting, such as ``spacing_m``.
+        problem: What is wrong with it, and what to do.
+    """
+
+    def __init__(self, field: str, problem: str) -> None:
+        super().__init__(f"{field}: {problem}")
+        self.field, self.problem = field, problem
+
+
 def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
     """Run a command; return 0, or print ``error: ...`` for what a person can fix and return 1.
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from baselines.cli import mapping, training
-from synfeal.cli.options import command, option
-from synfeal.errors import InputError
+from synfeal.cli.options import command, keywords, option
 
 DEVICES = ("auto", "cpu", "cuda")
 
@@ -34,26 +33,15 @@ DEVICES = ("auto", "cpu", "cuda")
     *mapping.MAP_OPTIONS,
     option("--out", "file to write (poses.csv)", type=Path, default=Path("poses.csv")),
     option("--device", "with a model: where to run (auto)", choices=DEVICES),
+    function="baselines.api:localize",
 )
 def localize(arguments: argparse.Namespace) -> None:
     """Estimate where pictures were taken, with a model or a map of that place."""
-    if arguments.model.is_dir():
-        _refuse(arguments, ("turns", "device"), "is for models, and a map is a folder")
-        mapping.localize_by_map(arguments)
-    else:
-        _refuse(arguments, ("confidence", "refine"), "is for maps, which are folders")
-        training.localize_by_model(arguments)
+    from baselines.api import localize as estimate
 
-
-def _refuse(arguments: argparse.Namespace, options: Sequence[str], reason: str) -> None:
-    """Refuse options that would have no effect.
-
-    Raises:
-        InputError: One was given.
-    """
-    for name in options:
-        if getattr(arguments, name) is not None:
-            raise InputError(f"--{name}: {reason}, such as {arguments.model}; leave it out")
+    done: Any = estimate(**keywords(arguments, localize))
+    report = mapping if arguments.model.is_dir() else training
+    report.report_localized(arguments, done)
 
 
 COMMANDS = (training.train, mapping.map, localize)

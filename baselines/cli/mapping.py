@@ -7,14 +7,11 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from baselines.cli.training import photograph_camera
 from synfeal.cli.meshes import RGBD_OPTIONS
-from synfeal.cli.options import command, option
-from synfeal.errors import InputError
+from synfeal.cli.options import command, keywords, option
 
 if TYPE_CHECKING:
     from baselines.references.localized import LocalizedInMap
-    from synfeal.scanning.camera import CameraOptions
 
 
 # Beyond, a focal length is not that of the camera: tolerances of lenses are a third of it.
@@ -35,13 +32,13 @@ log = logging.getLogger("synfeal")
     ),
     option("--out", "folder to write", type=Path, required=True, metavar="DIR"),
     option(
-        "--frames",
+        "--range",
         "range of frames to take, from 0, STOP exclusive (all)",
         type=int,
         nargs=2,
         metavar=("START", "STOP"),
     ),
-    option("--every", "take every K-th frame (1)", type=int, default=1, metavar="K"),
+    option("--stride", "take every N-th frame (1)", type=int, default=1, metavar="N"),
     option(
         "--most",
         "largest number of frames; if there are more, N of them, spread evenly (1000)",
@@ -51,42 +48,17 @@ log = logging.getLogger("synfeal")
     ),
     *RGBD_OPTIONS,
     option("--seed", "seed of the vocabulary that retrieval learns (0)", type=int, default=0),
+    function="baselines.api:map",
+    was={"--frames": "--range", "--every": "--stride", "--poses-are": "--convention"},
 )
 def map(arguments: argparse.Namespace) -> None:  # noqa: A001 (the name of the command)
     """Build a map of image features, placed in space by depth, from renderings or photographs."""
+    from baselines.api import map as build
     from baselines.references.localized import describe_map
-    from baselines.references.map_frames import FrameChoice, read_map_frames
-    from baselines.references.mapped import build_map
 
-    if not 0 <= arguments.seed < 2**63:
-        raise InputError(f"--seed: must be 0 to 2^63 - 1, found {arguments.seed}")
-    start, stop = arguments.frames or (0, None)
-    choice = FrameChoice(start, stop, every=arguments.every, most=arguments.most)
-    frames = read_map_frames(
-        folder=arguments.dataset,
-        choice=choice,
-        cameras=camera_options(arguments),
-        poses_are=arguments.poses_are or "world_from_cam",
-    )
-    made = build_map(frames, arguments.out, arguments.seed)
+    made = build(**keywords(arguments, map))
     print(f"{arguments.out}: {describe_map(made)}, {made.record['seconds']:.0f} s")
     print(f"synfeal localize {arguments.out} photos/ --out poses.csv")
-
-
-def camera_options(arguments: argparse.Namespace) -> CameraOptions:
-    """Read the options of colour and depth camera, :data:`RGBD_OPTIONS`."""
-    from synfeal.scanning.camera import CameraOptions
-
-    aside = arguments.depth_from_color
-    return CameraOptions(
-        preset=arguments.preset,
-        color_camera=arguments.color_camera,
-        depth_camera=arguments.depth_camera,
-        color_focal_px=arguments.color_focal,
-        depth_focal_px=arguments.depth_focal,
-        depth_from_color=None if aside is None else tuple(aside),
-        depth_units_per_m=arguments.depth_scale,
-    )
 
 
 MAP_OPTIONS = (
@@ -106,22 +78,8 @@ MAP_OPTIONS = (
 )
 
 
-def localize_by_map(arguments: argparse.Namespace) -> None:
-    """Carry out ``synfeal localize`` with a map."""
-    from baselines.references.confidence import LEAST_CONFIDENCE
-    from baselines.references.localized import localize_in_map
-
-    out: Path = arguments.out
-    confidence = arguments.confidence
-    done = localize_in_map(
-        arguments.model,
-        arguments.images,
-        out,
-        camera=photograph_camera(arguments),
-        world=arguments.world,
-        least_confidence=LEAST_CONFIDENCE if confidence is None else confidence,
-        refine=arguments.refine,
-    )
+def report_localized(arguments: argparse.Namespace, done: LocalizedInMap) -> None:
+    """Say what ``synfeal localize`` found with a map, and what may be wrong with it."""
     if abs(done.focal_ratio - 1.0) > WRONG_FOCAL:  # not of NaN
         log.warning(
             "the photographs fit best with %.3f times the focal length given; is it that of their"
@@ -138,7 +96,7 @@ def localize_by_map(arguments: argparse.Namespace) -> None:
     if done.n_found == 0 and not done.n_ambiguous:
         log.warning("is it another place, or is the focal length of the photographs wrong?")
     print(f"{arguments.model}: {done.n_frames} frames, {done.n_points} features")
-    print(f"{out}: {found_text(done)}")
+    print(f"{arguments.out}: {found_text(done)}")
 
 
 def found_text(done: LocalizedInMap) -> str:

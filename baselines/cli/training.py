@@ -8,10 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from baselines.config.learning import MODELS
-from synfeal.camera.photograph import PhotographCamera
-from synfeal.cli.options import command, option
-from synfeal.config.photometric import PhotometricConfig
-from synfeal.errors import InputError
+from synfeal.cli.options import command, keywords, option
 
 if TYPE_CHECKING:
     from baselines.training.localize import Localized
@@ -30,12 +27,13 @@ CALIBRATION_OPTIONS = (
         "--focal",
         "focal length of the photographs in their pixels, in place of a calibration",
         type=float,
+        dest="focal_px",
         metavar="PX",
     ),
     option(
-        "--no-exif",
-        "ignore the focal length in the photographs' EXIF data",
-        action="store_true",
+        "--exif",
+        "read the focal length in the photographs' EXIF data if neither is given (yes)",
+        action=argparse.BooleanOptionalAction,
     ),
 )
 
@@ -57,15 +55,6 @@ LOCALIZE_OPTIONS = (
 )
 
 
-def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
-    """Read the camera of photographs by :data:`CALIBRATION_OPTIONS`.
-
-    Raises:
-        InputError: The calibration cannot be used.
-    """
-    return PhotographCamera.read(arguments.camera, arguments.focal, not arguments.no_exif)
-
-
 @command(
     "train a localizer on a data set of your own",
     "synfeal train mydata --out trained",
@@ -84,7 +73,7 @@ def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
     ),
     option("--minutes", "train for about this long instead", type=float, metavar="M"),
     option(
-        "--frames",
+        "--range",
         "range of photographs to take, from 0, STOP exclusive; repeat it for further ranges",
         type=int,
         nargs=2,
@@ -108,9 +97,10 @@ def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
     ),
     *CALIBRATION_OPTIONS,
     option(
-        "--input-px",
+        "--input",
         "side of the network's image (64 on a processor, 224 on a GPU)",
         type=int,
+        dest="input_px",
         metavar="PX",
     ),
     option(
@@ -128,61 +118,20 @@ def photograph_camera(arguments: argparse.Namespace) -> PhotographCamera:
     ),
     option("--device", "where to train (auto)", choices=("auto", "cpu", "cuda"), default="auto"),
     option("--seed", "seed of all random numbers (0)", type=int, default=0),
+    function="baselines.api:train",
+    was={"--frames": "--range"},
 )
 def train(arguments: argparse.Namespace) -> None:
     """Train a localizer on data sets; after an interruption, the same command continues."""
-    from baselines.training.own_frames import FrameRange
-    from baselines.training.train import DEFAULT_IMAGES, TrainJob
-    from baselines.training.train import train as learn
+    from baselines.api import train as learn
 
-    if arguments.images is not None and arguments.minutes is not None:
-        raise InputError("--minutes: --images says how long already; give one of the two")
-    if not 0 <= arguments.seed < 2**63:
-        raise InputError(f"--seed: must be 0 to 2^63 - 1, found {arguments.seed}")
-    default = None if arguments.minutes is not None else DEFAULT_IMAGES
-    job = TrainJob(
-        datasets=tuple(arguments.datasets),
-        out=arguments.out,
-        localizer=arguments.localizer,
-        images=default if arguments.images is None else arguments.images,
-        minutes=arguments.minutes,
-        ranges=tuple(FrameRange(start, stop) for start, stop in arguments.frames),
-        photographs=photograph_camera(arguments),
-        held_out=arguments.held_out,
-        randomisation=_randomisation(arguments.randomisation),
-        input_px=arguments.input_px,
-        width=arguments.width,
-        batch=arguments.batch,
-        start=arguments.start,
-        device=arguments.device,
-        seed=arguments.seed,
-    )
     logging.getLogger("baselines.training").setLevel(logging.INFO)
     try:
-        done = learn(job)
+        done = learn(**keywords(arguments, train))
     except KeyboardInterrupt as interrupt:
         raise KeyboardInterrupt("run the same command again to go on") from interrupt
     print(trained_text(done))
     print(f"synfeal localize {done.model} photos/ --out poses.csv")
-
-
-def _randomisation(text: str) -> PhotometricConfig | None:
-    """Read the ranges that ``--randomisation`` stands for.
-
-    Raises:
-        InputError: The file cannot be read, or holds other keys or values.
-    """
-    if text in ("on", "off"):
-        return PhotometricConfig() if text == "on" else None
-    from pydantic import ValidationError
-
-    from synfeal.config.load import describe, read_yaml
-
-    path = Path(text)
-    try:
-        return PhotometricConfig.model_validate(read_yaml(path))
-    except ValidationError as error:
-        raise InputError(f"{path}: {describe(error)}") from error
 
 
 def trained_text(done: TrainedModel) -> str:
@@ -198,20 +147,8 @@ def trained_text(done: TrainedModel) -> str:
     return f"{done.model}: {learned}; {error}"
 
 
-def localize_by_model(arguments: argparse.Namespace) -> None:
-    """Carry out ``synfeal localize`` with a checkpoint."""
-    from baselines.training.localize import DEFAULT_TURNS, localize
-
-    out: Path = arguments.out
-    done = localize(
-        arguments.model,
-        arguments.images,
-        out,
-        arguments.device or "auto",
-        camera=photograph_camera(arguments),
-        world=arguments.world,
-        turns=DEFAULT_TURNS if arguments.turns is None else arguments.turns,
-    )
+def report_localized(arguments: argparse.Namespace, done: Localized) -> None:
+    """Say what ``synfeal localize`` did with a checkpoint, and what may be wrong with it."""
     if done.n_failed:
         message = "%d of %d poses are not finite: the training of %s diverged"
         log.warning(message, done.n_failed, done.n_images, arguments.model)
@@ -226,7 +163,7 @@ def localize_by_model(arguments: argparse.Namespace) -> None:
     print(f"{arguments.model}: {model_text(done)}")
     if done.n_resampled:
         print(f"{arguments.model}: {resampled_text(done)}")
-    print(f"{out}: {poses_text(done)}")
+    print(f"{arguments.out}: {poses_text(done)}")
 
 
 # Of pictures of the place 5 % are called unlike; twice as many are no chance any more.

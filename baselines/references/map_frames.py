@@ -70,7 +70,7 @@ class MapFrames:
     def posed_depth(self) -> PosedDepth:
         """Depth and poses, to be checked against each other."""
         frames = PosedFrames(self.names, self.color, self.depth, self.world_from_cam)
-        return posed_depth(frames, self.rgbd, options=frozenset({"--poses-are", "--depth-scale"}))
+        return posed_depth(frames, self.rgbd, options=frozenset({"--convention", "--depth-scale"}))
 
     @property
     def camera(self) -> CameraConfig:
@@ -160,8 +160,8 @@ class FrameChoice:
     def __post_init__(self) -> None:
         stop = self.start + 1 if self.stop is None else self.stop
         if not 0 <= self.start < stop:
-            raise InputError(f"--frames: needs 0 <= START < STOP, found {self.start} {stop}")
-        for flag, value in (("--every", self.every), ("--most", self.most)):
+            raise InputError(f"--range: needs 0 <= START < STOP, found {self.start} {stop}")
+        for flag, value in (("--stride", self.every), ("--most", self.most)):
             if value < 1:
                 raise InputError(f"{flag}: must be at least 1, found {value}")
 
@@ -239,7 +239,5 @@ def _training_frames(folder: Path, frames: slice) -> PosedFrames:
     )
     chosen = every[frames]
     if not len(chosen):
-        raise InputError(
-            f"{folder}: has {len(every)} training frames, none of them in the range of --frames"
-        )
+        raise InputError(f"{folder}: has {len(every)} training frames, none of them in --range")
     return chosen

@@ -61,7 +61,7 @@ class FrameRange:
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop:
             raise InputError(
-                f"--frames: {self.start} {self.stop} holds no frame; give the first frame, from 0,"
+                f"--range: {self.start} {self.stop} holds no frame; give the first frame, from 0,"
                 " and one past the last"
             )
 
@@ -202,7 +202,7 @@ def _ranges_of(
         part = whole[chosen.start : chosen.stop]
         if not len(part):
             raise InputError(
-                f"{folder}: a sequence has {len(whole)} frames, none of them in --frames"
+                f"{folder}: a sequence has {len(whole)} frames, none of them in --range"
                 f" {chosen.start} {chosen.stop}"
             )
         yield part

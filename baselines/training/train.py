@@ -236,7 +236,7 @@ def _check(job: TrainJob) -> None:
 def _refuse_useless(job: TrainJob, sets: Sequence[OwnFrames]) -> None:
     """Refuse what is said of photographs where there are none."""
     camera = {"file": "--camera", "focal": "--focal"}.get(str(job.photographs.source))
-    for option in ("--frames" if job.ranges else None, camera):
+    for option in ("--range" if job.ranges else None, camera):
         if option and all(own.is_rendered for own in sets):
             raise InputError(
                 f"{option}: is of photographs, and {sets[0].folder} is a data set of synfeal"

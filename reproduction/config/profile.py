@@ -17,9 +17,10 @@ from baselines.config.learning import (
     PretrainingConfig,
 )
 from baselines.config.references import ReferencesConfig
+from reproduction.config.dataset import DatasetConfig
+from reproduction.config.robustness import RobustnessConfig
 from reproduction.config.tables import RepeatedTraining, TableName
-from synfeal.config.dataset import CameraConfig, DatasetConfig
-from synfeal.config.effects import RobustnessConfig
+from synfeal.config.dataset import CameraConfig
 from synfeal.config.types import Count, Slug, Strict, part
 
 # An image costs the network of scene coordinates as much as so many cost a localizer: where

@@ -15,10 +15,11 @@ from baselines.labels.batches import Batch, batches_of
 from baselines.labels.methods import stages_of
 from baselines.localizers.registry import backbone_of
 from reproduction.config.profile import Config
+from reproduction.config.robustness import MIXED
 from reproduction.design.experiments import Design, Run, common_every, split_init
 from reproduction.design.references import DataSet, answered_by, data_sets, has_structure
 from synfeal.config.dataset import RenderConfig
-from synfeal.config.effects import CLEAN, MIXED, EffectsConfig
+from synfeal.config.effects import CLEAN, EffectsConfig
 from synfeal.dataset.frame_files import SUFFIX
 from synfeal.dataset.sevenscenes import Sequence, sequences_of
 from synfeal.effects.files import carton_files, light_share_files

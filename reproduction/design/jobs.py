@@ -14,12 +14,13 @@ from baselines.config.learning import MODELS
 from baselines.labels.methods import frame_methods, graph_methods, stages_of
 from baselines.references.registry import in_group
 from baselines.registry.kinds import Group
+from reproduction.config.robustness import MIXED
 from reproduction.design.experiments import INJECTED
 from reproduction.design.files import SPLITS, Files
 from reproduction.design.label_sets import INJECTED_PATTERN
 from reproduction.design.references import DataSet
 from reproduction.design.side_tables import made_side_tables
-from synfeal.config.effects import CLEAN, MIXED
+from synfeal.config.effects import CLEAN
 
 # Wildcards of a job, by name.
 Job = dict[str, str]

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.config.learning import MODELS
+from reproduction.config.robustness import MIXED
 from reproduction.design.experiments import Experiment
 from reproduction.figures.error_by_design import BLOCKS, NOISE, UNITS
 from reproduction.figures.sources import SPLITS, Array, Results, counted
@@ -25,7 +26,7 @@ from reproduction.figures.style import (
 from reproduction.statistics.limits import read_errors
 from reproduction.tables import references, robustness
 from reproduction.tables.layouts import DOSE, TITLES, label_title, scene_title
-from synfeal.config.effects import CLEAN, MIXED
+from synfeal.config.effects import CLEAN
 from synfeal.errors import InputError
 from synfeal.evaluation.metrics import cumulative, joint_error
 

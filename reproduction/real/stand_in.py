@@ -64,10 +64,10 @@ def write_stand_in(
             frames,
             depth=True,
             seed=seed,
-            spacing=spacing_m,
-            min_view_distance=0.6,
-            min_path=1.0,
-            pitch=(-20.0, 45.0),  # the floor tells which way is down
+            spacing_m=spacing_m,
+            min_view_distance_m=0.6,
+            min_path_m=1.0,
+            pitch_deg=(-20.0, 45.0),  # the floor tells which way is down
             camera=work / CAMERA,
             effects=work / "effects.yaml",
             sequence_frames=frames,

@@ -12,10 +12,11 @@ import pandas as pd
 from baselines.config.learning import MODELS
 from baselines.references.registry import REFERENCES
 from baselines.references.robustness import SCHEMA, STRUCTURE, robustness_table
+from reproduction.config.robustness import MIXED
 from reproduction.tables.columns import Column, SideLayout, by_method, method_columns
 from reproduction.tables.layouts import TITLES
 from reproduction.tables.side import SideTable, Source, Table
-from synfeal.config.effects import CLEAN, MIXED
+from synfeal.config.effects import CLEAN
 from synfeal.records.tables import read_frame, write_frame
 
 NAME = "robustness"

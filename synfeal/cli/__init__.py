@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from synfeal import __version__
 from synfeal.cli import capturing, datasets, meshes
-from synfeal.cli.options import Command, numbers_apart
+from synfeal.cli.options import Command, in_words_of_today, numbers_apart
 from synfeal.errors import exit_status
 
 
@@ -30,6 +30,7 @@ OWN_COMMANDS: tuple[Command, ...] = (
     capturing.unpack,
     meshes.scan,
     meshes.collect,
+    meshes.plan,
     meshes.inspect,
     datasets.preview,
     datasets.validate,
@@ -42,11 +43,15 @@ OWN_COMMANDS: tuple[Command, ...] = (
 ENTRY_POINTS = "synfeal.commands"
 
 
+def added_commands() -> tuple[Command, ...]:
+    """List the commands of the packages installed beside the simulator."""
+    found = sorted(entry_points(group=ENTRY_POINTS), key=lambda entry: entry.name)
+    return tuple(command for entry in found for command in entry.load().COMMANDS)
+
+
 def all_commands() -> tuple[Command, ...]:
     """List the simulator's own commands, then those of the packages installed beside it."""
-    found = sorted(entry_points(group=ENTRY_POINTS), key=lambda entry: entry.name)
-    added = [command for entry in found for command in entry.load().COMMANDS]
-    return (*OWN_COMMANDS, *added)
+    return (*OWN_COMMANDS, *added_commands())
 
 
 def build_parser(commands: Sequence[Command]) -> argparse.ArgumentParser:
@@ -72,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     commands = all_commands()
     every = tuple(option for command in commands for option in command.options)
-    given = sys.argv[1:] if argv is None else argv
+    given = in_words_of_today(sys.argv[1:] if argv is None else argv, commands)
     arguments, unknown = build_parser(commands).parse_known_args(list(numbers_apart(given, every)))
     if unknown:  # the command's own parser reports it, with its usage
         arguments.usage.error(f"unrecognized arguments: {' '.join(unknown)}")

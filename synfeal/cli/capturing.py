@@ -22,7 +22,8 @@ log = logging.getLogger("synfeal")
         "format of the capture, where its files fit several (found from the files)",
         metavar="NAME",
     ),
-    option("--every", "take every K-th frame (1)", type=int, default=1, metavar="K"),
+    option("--stride", "take every N-th frame (1)", type=int, default=1, metavar="N"),
+    was={"--every": "--stride"},
 )
 def unpack(arguments: argparse.Namespace) -> None:
     """Read a capture in any of the formats of docs/captures.md and write frames, poses and cameras.
@@ -33,13 +34,13 @@ def unpack(arguments: argparse.Namespace) -> None:
     from synfeal.captures.unpack import unpack as write
     from synfeal.records.progress import Progress
 
-    if arguments.every < 1:
-        raise InputError(f"--every: must be at least 1, found {arguments.every}")
+    if arguments.stride < 1:
+        raise InputError(f"--stride: must be at least 1, found {arguments.stride}")
     capture = read_capture(arguments.capture, arguments.format)
     title = capture_formats()[capture.format].title
     print(f"{arguments.capture}: {len(capture)} frames of {title}")
-    with Progress(-(-len(capture) // arguments.every), "unpacked") as progress:
-        done = write(capture, arguments.out, stride=arguments.every, on_frame=progress.update)
+    with Progress(-(-len(capture) // arguments.stride), "unpacked") as progress:
+        done = write(capture, arguments.out, stride=arguments.stride, on_frame=progress.update)
     for note in done.notes:
         log.warning("%s: %s", arguments.capture, note)
     color, depth = done.color, done.depth

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from synfeal.cli.options import command, option
+from synfeal.cli.options import command, keywords, option
 from synfeal.errors import InputError
 
 FORMATS = ("ace", "colmap", "hloc", "mstransformer", "nerfstudio", "rosbag", "tum")
@@ -22,7 +22,6 @@ POSE_FORMATS = (
 )
 # fmt: on
 LAYERS = ("color", "depth", "normals", "masks", "right", "right-depth")
-FILES = ("scores.csv", "errors.csv", "errors.png")
 DATASET = option("dataset", "directory of seq-01 or seq-01.zip", type=Path, metavar="DATASET")
 CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metavar="FILE")
 
@@ -42,23 +41,17 @@ CAMERA = option("--camera", "calibration file (manifest.json)", type=Path, metav
     option("--fps", "frames per second, at most 50 (12)", type=float, default=12.0),
     option("--split", "split to show (train)", choices=("train", "test"), default="train"),
     option("--show", "layers to show side by side (color)", nargs="+", choices=LAYERS),
+    function="synfeal.api:preview",
 )
 def preview(arguments: argparse.Namespace) -> None:
     """Write a GIF or MP4 of the first frames of a data set.
 
     Several data sets, such as the same paths with other effects, are shown side by side.
     """
-    from synfeal.dataset.preview import write_preview
+    from synfeal.api import preview as write
 
     out = arguments.out or arguments.datasets[0] / "preview.gif"
-    shown = write_preview(
-        arguments.datasets,
-        out,
-        arguments.frames,
-        arguments.fps,
-        arguments.split,
-        arguments.show or ("color",),
-    )
+    shown = write(**{**keywords(arguments, preview), "out": out})
     print(f"{out}: {shown} frames")
 
 
@@ -67,14 +60,18 @@ def preview(arguments: argparse.Namespace) -> None:
     "synfeal validate mydata",
     DATASET,
     CAMERA,
-    option("--all", "compare every pair of frames, not a sample of 600", action="store_true"),
+    option(
+        "--every-pair", "compare every pair of frames, not a sample of 600", action="store_true"
+    ),
+    function="synfeal.api:validate",
+    was={"--all": "--every-pair"},
 )
 def validate(arguments: argparse.Namespace) -> None:
     """Check files, poses, splits, hashes and geometry of a data set; exit 1 if a check fails."""
     from synfeal.validation.run import error_lines, report
     from synfeal.validation.run import validate as run_checks
 
-    checks = run_checks(arguments.dataset, arguments.camera, arguments.all)
+    checks = run_checks(arguments.dataset, arguments.camera, arguments.every_pair)
     print(report(arguments.dataset, checks), end="", flush=True)
     errors = error_lines(checks)
     for line in errors[:-1]:
@@ -91,14 +88,14 @@ def validate(arguments: argparse.Namespace) -> None:
     option("--out", "directory to create", type=Path, required=True),
     option("--copy", "copy colour images instead of linking to them", action="store_true"),
     CAMERA,
+    function="synfeal.api:export",
 )
 def export(arguments: argparse.Namespace) -> None:
     """Write a 7-Scenes data set in the format of another program."""
-    from synfeal.exporting.run import export as write
+    from synfeal.api import export as write
 
-    out: Path = arguments.out
-    n_frames = write(arguments.dataset, arguments.to, out, arguments.copy, arguments.camera)
-    print(f"{out}: {n_frames} frames for {arguments.to}")
+    n_frames = write(**keywords(arguments, export))
+    print(f"{arguments.out}: {n_frames} frames for {arguments.to}")
 
 
 @command(
@@ -112,7 +109,9 @@ def export(arguments: argparse.Namespace) -> None:
         choices=("each", "train", "test", "all"),
         default="each",
     ),
-    option("--every", "take every N-th frame of each sequence (1)", type=int, default=1),
+    option(
+        "--stride", "take every N-th frame of each sequence (1)", type=int, default=1, metavar="N"
+    ),
     option("--min-overlap", "least overlap of a pair, 0 - 1 (0.1)", type=float, default=0.1),
     option("--max-overlap", "greatest overlap of a pair, 0 - 1 (1)", type=float, default=1.0),
     option("--per-frame", "keep only this many pairs per frame, by overlap (all)", type=int),
@@ -132,6 +131,8 @@ def export(arguments: argparse.Namespace) -> None:
     ),
     option("--flow", "write optical flow of each pair, both ways", action="store_true"),
     CAMERA,
+    function="synfeal.api:pairs",
+    was={"--every": "--stride"},
 )
 def pairs(arguments: argparse.Namespace) -> None:
     """Compare all frames of a data set by depth and poses, without rendering.
@@ -151,7 +152,7 @@ def pairs(arguments: argparse.Namespace) -> None:
             max_overlap=arguments.max_overlap,
             per_frame=arguments.per_frame,
         ),
-        every=arguments.every,
+        every=arguments.stride,
         tolerance=arguments.tolerance,
         grid=tuple(arguments.grid),
         flow=arguments.flow,
@@ -185,7 +186,6 @@ def pairs(arguments: argparse.Namespace) -> None:
         "--format",
         "format of POSES (recognised by their content)",
         choices=POSE_FORMATS,
-        dest="file_format",
     ),
     option("--split", "frames to score (test)", choices=("test", "train", "all"), default="test"),
     option(
@@ -204,22 +204,31 @@ def pairs(arguments: argparse.Namespace) -> None:
         "--max-difference",
         "between two files of poses: largest difference of two times of a pair, seconds (0.01)",
         type=float,
+        dest="max_difference_s",
         metavar="S",
     ),
     option(
         "--offset",
         "between two files of poses: seconds to add to the times of POSES (0)",
         type=float,
+        dest="offset_s",
         metavar="S",
     ),
-    option("--rate", "with TUM and EuRoC: frames per second (30)", type=float, metavar="HZ"),
+    option(
+        "--rate",
+        "with TUM and EuRoC: frames per second (30)",
+        type=float,
+        dest="rate_hz",
+        metavar="HZ",
+    ),
     CAMERA,
     option("--out", "directory for scores.csv, errors.csv and errors.png", type=Path),
+    function="synfeal.api:evaluate",
 )
 def evaluate(arguments: argparse.Namespace) -> None:
     """Score poses of any common format against a data set: errors, recalls, reprojection error."""
     from synfeal.evaluation import run
-    from synfeal.evaluation.text import report_text, write_files
+    from synfeal.evaluation.text import FILES, report_text, write_files
     from synfeal.records.files import refuse_foreign
 
     out: Path | None = arguments.out
@@ -229,12 +238,12 @@ def evaluate(arguments: argparse.Namespace) -> None:
         split=arguments.split,
         align=arguments.align,
         convention=arguments.convention,
-        rate_hz=arguments.rate,
+        rate_hz=arguments.rate_hz,
         labels=arguments.labels,
         camera=arguments.camera,
-        file_format=arguments.file_format,
-        most_apart_s=0.01 if arguments.max_difference is None else arguments.max_difference,
-        offset_s=arguments.offset or 0.0,
+        file_format=arguments.format,
+        most_apart_s=(0.01 if arguments.max_difference_s is None else arguments.max_difference_s),
+        offset_s=arguments.offset_s or 0.0,
     )
     found = run.evaluate(arguments.dataset, arguments.poses, settings)
     print(report_text(arguments.poses, settings, found), end="")

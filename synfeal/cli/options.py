@@ -1,29 +1,69 @@
-"""Declaration of commands and their options, and the options of a mesh that several share."""
+"""Declaration of commands and their options, by hand or from the fields of a configuration."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection, Iterator, Sequence
-from typing import Any, NamedTuple
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from synfeal.config.collect import Shown
+from synfeal.config.flags import UNITS, flag_of
+from synfeal.errors import InputError, SettingError
+
+log = logging.getLogger("synfeal")
 
 # Flag, and its arguments of argparse.
 Option = tuple[str, dict[str, Any]]
 Action = Callable[[argparse.Namespace], None]
+# From arguments as an earlier version took them to those of today; None where they are no such.
+Rewriting = Callable[[Sequence[str]], Sequence[str] | None]
 
 
 class Command(NamedTuple):
-    """One sub-command of ``synfeal``, with what its own help and that of ``synfeal`` say."""
+    """One sub-command of ``synfeal``, with what its own help and that of ``synfeal`` say.
+
+    Attributes:
+        name: Its name, and that of the function of :mod:`synfeal` that does the same.
+        summary: For the list of commands.
+        description: For its own help.
+        example: A command line.
+        options: Its options.
+        action: What it does; imports what it needs when it is called, so that ``--help`` is quick.
+        function: ``module:name`` of the function that does the same from Python, if there is one.
+        was: Earlier flags, each with that of today; an empty one stands for an argument.
+        rewriting: Recognises command lines of an earlier version that had another name.
+    """
 
     name: str
     summary: str
     description: str
     example: str
     options: tuple[Option, ...]
-    action: Action  # imports what it needs when it is called: ``--help`` is quick
+    action: Action
+    function: str | None = None
+    was: Mapping[str, str] = {}
+    rewriting: Rewriting | None = None
 
     def __call__(self, arguments: argparse.Namespace) -> None:
-        """Carry it out."""
-        self.action(arguments)
+        """Carry it out, saying of options what its function says of settings."""
+        try:
+            self.action(arguments)
+        except SettingError as error:
+            raise InputError(f"{self.shown(error.field)}: {error.problem}") from error
+
+    def shown(self, name: str) -> str:
+        """Return how a setting is written on the command line: its flag, or its place."""
+        for flag, details in self.options:
+            if destination(flag, details) == name:
+                metavar = details.get("metavar", flag.upper())
+                return flag if flag.startswith("-") else str(metavar)
+        return name
 
 
 def option(flag: str, text: str, **details: Any) -> Option:
@@ -31,34 +71,147 @@ def option(flag: str, text: str, **details: Any) -> Option:
     return flag, {"help": text, **details}
 
 
-def command(summary: str, example: str, *options: Option) -> Callable[[Action], Command]:
+def command(
+    summary: str,
+    example: str,
+    *options: Option,
+    function: str | None = None,
+    was: Mapping[str, str] | None = None,
+    rewriting: Rewriting | None = None,
+) -> Callable[[Action], Command]:
     """Make a command of a function, whose name and docstring become its name and description."""
 
     def of(action: Action) -> Command:
         description = " ".join((action.__doc__ or "").split())
-        return Command(action.__name__, summary, description, example, options, action)
+        name = action.__name__
+        return Command(
+            name, summary, description, example, options, action, function, was or {}, rewriting
+        )
 
     return of
 
 
-MESH_OPTIONS = (
-    option(
-        "--box",
-        "where camera centres may be, metres (the mesh's bounds); repeat it for further rooms or"
-        " floors",
-        type=float,
-        nargs=6,
-        action="append",
-        metavar=("X0", "X1", "Y0", "Y1", "Z0", "Z1"),
-    ),
-    option("--up-axis", "axis that points up in the file (auto)", choices=("auto", "y", "z")),
-    option("--unit-m", "metres per unit of the file (1)", type=float),
-)
+def destination(flag: str, details: Mapping[str, Any]) -> str:
+    """Return the name that an option has in Python."""
+    return str(details.get("dest", flag.lstrip("-").replace("-", "_")))
 
 
-def options_among(arguments: argparse.Namespace, names: Collection[str]) -> dict[str, Any]:
-    """Return those of the named options that the command has, by name."""
-    return {name: value for name, value in vars(arguments).items() if name in names}
+def options_of(model: type[BaseModel], *, positional: str | None = None) -> Iterator[Option]:
+    """Make an option of each field of a configuration, the required ones first.
+
+    Args:
+        model: The configuration.
+        positional: Field that is an argument without a flag, if one is.
+    """
+    fields = sorted(model.model_fields.items(), key=lambda item: not item[1].is_required())
+    for name, field in fields:
+        details = _details(name, field)
+        if name == positional:
+            del details["required"], details["dest"]
+            yield name, {**details, "metavar": name.upper()}
+        else:
+            yield flag_of(name), details
+
+
+def _details(name: str, field: FieldInfo) -> dict[str, Any]:
+    """Return the arguments of argparse for a field."""
+    shown = next((each for each in field.metadata if isinstance(each, Shown)), Shown())
+    kind = _plain(field.annotation)
+    text, default = field.description or "", shown.default or _default_text(field)
+    details: dict[str, Any] = {"dest": name, "help": f"{text} ({default})" if default else text}
+    if field.is_required():
+        details["required"] = True
+    if kind is bool:
+        return {**details, "action": "store_true", "default": None}
+    values = get_args(kind)
+    if get_origin(kind) is Literal:
+        return {**details, "choices": values}
+    if get_origin(kind) is tuple:
+        if values[-1] is Ellipsis:
+            details["action"], values = "append", get_args(_plain(values[0]))
+        details |= {"type": _plain(values[0]), "nargs": len(values)}
+        return details | ({"metavar": shown.values} if shown.values else {})
+    unit = UNITS.get(name.rpartition("_")[2])
+    usual = "FILE" if kind is Path else "N" if kind is int else None
+    metavar = shown.values[0] if shown.values else unit or usual
+    details["type"] = kind if kind in (int, float, Path) else Path
+    return details | (
+        {"metavar": metavar} if metavar else {"metavar": "FILE"} if details["type"] is Path else {}
+    )
+
+
+def _plain(annotation: Any) -> Any:
+    """Return a type without its bounds and without None."""
+    if get_origin(annotation) is Annotated:
+        return _plain(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, UnionType):
+        some = [each for each in get_args(annotation) if each is not NoneType]
+        return _plain(some[0])
+    return annotation
+
+
+def _default_text(field: FieldInfo) -> str:
+    value = field.get_default()
+    if field.is_required() or isinstance(value, bool) or value is None or value == ():
+        return ""
+    if isinstance(value, tuple):
+        return " ".join(f"{each:g}" for each in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def given(arguments: argparse.Namespace, *models: type[BaseModel]) -> dict[str, Any]:
+    """Return the fields of some configurations that were given as options."""
+    names = [name for model in models for name in model.model_fields]
+    return {name: getattr(arguments, name) for name in names}
+
+
+def keywords(arguments: argparse.Namespace, command: Command) -> dict[str, Any]:
+    """Return the options that were given as keywords of the function that does the same."""
+    found: dict[str, Any] = {}
+    for flag, details in command.options:
+        value = getattr(arguments, destination(flag, details))
+        if value is not None:
+            several = isinstance(value, list) and details.get("action") != "append"
+            found[destination(flag, details)] = tuple(value) if several else value
+    return found
+
+
+def in_words_of_today(typed: Sequence[str], commands: Iterable[Command]) -> list[str]:
+    """Replace flags of the version before by those of today, and warn of each.
+
+    Flags may be written with their unit, too, as in Python: that is no reason to warn.
+    """
+    commands = tuple(commands)
+    for each in commands:
+        rewritten = each.rewriting(typed) if each.rewriting else None
+        if rewritten is not None:
+            log.warning("synfeal %s is called %s now", typed[0], each.name)
+            typed = rewritten
+            break
+    chosen = next((each for each in commands if typed and each.name == typed[0]), None)
+    if chosen is None:
+        return list(typed)
+    units = {
+        f"--{destination(flag, details).replace('_', '-')}": flag
+        for flag, details in chosen.options
+        if flag.startswith("--")
+    }
+    found: list[str] = []
+    for place, argument in enumerate(typed):
+        flag, equals, value = argument.partition("=")
+        if "--" in typed[:place] or not flag.startswith("--"):
+            found.append(argument)
+        elif flag in chosen.was:
+            present = chosen.was[flag]
+            log.warning(
+                "%s is called %s now" if present else "%s: leave the flag out%s",
+                flag,
+                present,
+            )
+            found += [f"{present}{equals}{value}"] if present else [value] if equals else []
+        else:
+            found.append(f"{units.get(flag, flag)}{equals}{value}")
+    return found
 
 
 def numbers_apart(arguments: Sequence[str], options: Sequence[Option]) -> Iterator[str]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trimesh.util import append_faces
 
 from synfeal.collection.collision import Rung, collision_mesh, write_curve
-from synfeal.config.collection import ClutterConfig, SceneConfig
+from synfeal.config.collection import BUILDERS, ClutterConfig, SceneConfig
 from synfeal.config.dataset import Shade
 from synfeal.config.load import check_mesh_file
 from synfeal.effects.files import CARTONS, carton_files
@@ -77,6 +77,7 @@ def prepare_mesh(
     seed: int,
     out_dir: Path,
     shade: Shade | None = None,
+    called: str | None = None,
 ) -> tuple[TexturedMesh, int]:
     """Write ``collision.ply``, ``collision_curve.csv``, ``clutter.json``, and ``mesh.glb`` last.
 
@@ -89,14 +90,16 @@ def prepare_mesh(
         out_dir: Directory to write to.
         shade: Light that frames are drawn with, which meshes without colours need; ``ambient`` is
             in the colours of ``mesh.glb``.
+        called: What messages call the scene; None for its key in a profile.
 
     Returns:
         The mesh in its own colours, and how many faces its collision mesh has.
     """
-    mesh = build_or_load(scene, seed, name)
+    called = called or f"scenes.{name}"
+    mesh = build_or_load(scene, seed, called)
     if shade is None:
-        refuse_colorless(mesh, f"scenes.{name}.path: {scene.path}")
-    box = sampling_box_of(scene, mesh.bounds_m, f"scenes.{name}")
+        refuse_colorless(mesh, str(scene.path or called))
+    box = sampling_box_of(scene, mesh.bounds_m, called)
     curve: list[Rung] = []
     if collision_agreement is None:
         collision = merge_vertices(*mesh.merged())
@@ -106,7 +109,7 @@ def prepare_mesh(
     places: list[dict[str, Any]] = []
     if scene.clutter is not None:
         rng = generator_of("clutter", scene.clutter.seed)
-        objects, places = cluttered(mesh, box, scene.clutter, rng, f"scenes.{name}.clutter")
+        objects, places = cluttered(mesh, box, scene.clutter, rng, f"{called}: clutter")
         # Paths avoid the objects as they are: none of them is simplified.
         vertices, faces = zip(collision, objects.merged(), strict=True)
         collision = Triangles(*append_faces(vertices, faces))
@@ -118,27 +121,18 @@ def prepare_mesh(
     return mesh, len(collision.faces)
 
 
-# Packages that build scenes from a seed register them here: an entry point is named like its
-# builder and points to a function from that name and a seed to a textured mesh.
-BUILDERS = "synfeal.scene_builders"
-
-
 def build_scene(builder: str, seed: int) -> TexturedMesh:
     """Build a procedural scene: textured, lit, z up, metres; the same bytes for one seed.
 
-    Raises:
-        InputError: no installed package has such a builder.
+    Args:
+        builder: Name of the scene among the entry points of :data:`BUILDERS`.
+        seed: Seed of the scene.
     """
-    known = entry_points(group=BUILDERS)
-    if builder not in known.names:
-        raise InputError(
-            f"builder: no procedural scene '{builder}'; choose one of {sorted(known.names)}"
-        )
-    mesh: TexturedMesh = known[builder].load()(builder, seed)
+    mesh: TexturedMesh = entry_points(group=BUILDERS)[builder].load()(builder, seed)
     return mesh
 
 
-def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
+def build_or_load(scene: SceneConfig, seed: int, called: str) -> TexturedMesh:
     """Build the stand-in named by the scene's ``builder``, or load the file at its ``path``.
 
     Textures that lie beside the file are not part of its hash.
@@ -146,7 +140,7 @@ def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
     Args:
         scene: Settings of the scene.
         seed: Seed of a procedural scene whose settings name none; unused for files.
-        name: Name of the scene in the configuration, for messages.
+        called: What messages call the scene.
 
     Raises:
         InputError: The file's SHA-256 is not the one that the settings give.
@@ -155,11 +149,11 @@ def build_or_load(scene: SceneConfig, seed: int, name: str) -> TexturedMesh:
         return build_scene(str(scene.builder), seed if scene.seed is None else scene.seed)
     path = Path(str(scene.path))
     if scene.sha256 is not None:
-        check_mesh_file(path, f"scenes.{name}.path")
+        check_mesh_file(path, f"{called}: path")
         found = file_sha256(path)
         if found != scene.sha256:
             raise InputError(
-                f"scenes.{name}.sha256: {path} has {found}, expected {scene.sha256}; download it"
+                f"{called}: sha256: {path} has {found}, expected {scene.sha256}; download it"
                 " again, or correct the hash if another version is meant"
             )
     return load_mesh(path, scene.up_axis, scene.unit_m)

@@ -9,19 +9,20 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 import synfeal
 from synfeal.collection.detail import write_detail
 from synfeal.collection.growing import WORK, growing
 from synfeal.collection.prepare import prepare_mesh, save_cartons
+from synfeal.config.collect import SCENE, CollectConfig, ViewConfig
 from synfeal.config.collection import SceneConfig
-from synfeal.config.dataset import CameraConfig, DatasetConfig, Shade
+from synfeal.config.dataset import CameraConfig, Shade, origin_record
 from synfeal.config.effects import MOST_PATH_OBJECTS
 from synfeal.dataset.finish import finish_dataset
 from synfeal.dataset.frame_files import SUFFIX
@@ -33,16 +34,16 @@ from synfeal.dataset.render_sequence import resolved
 from synfeal.dataset.sevenscenes import Split, sequences_of
 from synfeal.dataset.world import read_scan_record, rigid_motion_of, write_sequence_from_world
 from synfeal.effects.scene import crowd_of
-from synfeal.errors import InputError
+from synfeal.errors import InputError, SettingError
 from synfeal.geometry.poses import moved_right
 from synfeal.mesh.checks import shows_one_color
-from synfeal.mesh.load import is_y_up
+from synfeal.mesh.load import is_y_up, load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.mesh.triangles import load_collision_mesh
+from synfeal.mesh.triangles import load_collision_mesh, merge_vertices
 from synfeal.planning.coverage import empty_pixels, scene_coverage
 from synfeal.planning.plan import plan_mesh
-from synfeal.records.files import write_json
+from synfeal.records.files import file_sha256, write_json
 from synfeal.records.progress import Progress
 from synfeal.records.provenance import generator_of
 from synfeal.render.surface import Layers
@@ -68,8 +69,8 @@ def refuse_invisible(
     if shade is None and shows_one_color(mesh):
         raise InputError(
             f"{name}: is of one colour, and so would be every image; put its texture files (of an"
-            " OBJ also the .mtl) where it names them, export it with its texture, or set"
-            " render.shade to headlight, which shows its shape"
+            " OBJ also the .mtl) where it names them, export it with its texture, or give the"
+            " shade headlight, which shows its shape"
         )
     diagonal_m = float(np.linalg.norm(mesh.bounds_m[1] - mesh.bounds_m[0]))
     if diagonal_m <= camera.near_m:
@@ -172,215 +173,184 @@ SPLITS: tuple[Split, ...] = ("train", "test")
 
 @dataclass(frozen=True)
 class CollectJob:
-    """A collection: mesh, settings and where to write the data set."""
+    """A collection: settings, and where to write the data set."""
 
-    config: DatasetConfig  # settings with one scene, of one size
-    packed_px: int | None  # side of packed frames that are written too, pixels, if any
+    config: CollectConfig
     out: Path  # directory to create
 
-    @property
-    def scene(self) -> str:
-        """The name of the scene."""
-        return next(iter(self.config.scenes))
-
-    @property
-    def counts(self) -> dict[Split, int]:
-        """Frames of each split."""
-        (size,) = self.config.scenes[self.scene].sizes
-        return {split: self.config.n_frames(self.scene, size, split) for split in SPLITS}
+    @cached_property
+    def scene(self) -> SceneConfig:
+        """The scene, with the hash of its mesh as it is now."""
+        scene = self.config.scene
+        return scene.model_copy(update={"sha256": file_sha256(self.config.mesh)})
 
     @property
     def settings(self) -> dict[str, Any]:
         """All that decides the bytes of the data set, ready for JSON."""
-        kept = self.config.model_dump(mode="json", exclude={"profile", "results"})
-        world = self.sequence_from_world
-        own = {} if world is None else {"sequence_from_world": world.tolist()}
-        return {"synfeal": synfeal.__version__, **kept, "packed_px": self.packed_px, **own}
+        drawing = {"background_rgb", "backend", "shade", "supersampling"}
+        lens = set(ViewConfig.model_fields) - drawing  # ``camera`` below is what they come to
+        world, poses = self.sequence_from_world, self.config.poses
+        return {
+            "synfeal": synfeal.__version__,
+            **self.config.model_dump(mode="json", exclude=lens | {"stereo_m"}),
+            "mesh": str(self.config.mesh.absolute()),
+            "poses": poses and str(poses.absolute()),
+            "mesh_sha256": self.scene.sha256,
+            "camera": self.config.view.model_dump(mode="json"),
+            "sequence_from_world": None if world is None else world.tolist(),
+        }
 
-    @property
+    @cached_property
     def sequence_from_world(self) -> NDArray[np.float64] | None:
         """From the mesh's world to that of the sequence it was fused from, if it is a scan."""
-        scene = self.config.scenes[self.scene]
-        record = None if scene.path is None else read_scan_record(scene.path)
-        if scene.path is None or record is None:
+        mesh = self.config.mesh
+        record = read_scan_record(mesh)
+        if record is None:
             return None
-        if scene.unit_m != 1.0 or not is_y_up(scene.path, scene.up_axis):
+        if self.config.unit_m != 1.0 or not is_y_up(mesh, self.config.up_axis):
             log.warning(
-                "%s: is not used, --unit-m or --up-axis moves the mesh away from what it says",
-                scene.path.with_suffix(".json"),
+                "%s: is not used, unit or up axis move the mesh away from what it says",
+                mesh.with_suffix(".json"),
             )
             return None
-        return rigid_motion_of(record, scene.path.with_suffix(".json"))
+        return rigid_motion_of(record, mesh.with_suffix(".json"))
 
 
-def collect(job: CollectJob, workers: int = 1) -> None:
-    """Plan and render a data set into ``job.out``, which appears when it is complete.
+def collect(config: CollectConfig, out: Path, cores: int = 1) -> None:
+    """Plan and render a data set into ``out``, which appears when it is complete.
 
-    ``workers`` processes render, each a sequence at a time. What an earlier attempt made is kept
-    and not made again.
+    What an earlier attempt made is kept and not made again.
+
+    Args:
+        config: Settings of the data set; the backend ``auto`` is that which it stands for here,
+            since images depend on it.
+        out: Directory to create.
+        cores: Number of processes that render, each a sequence at a time.
 
     Raises:
         InputError: ``out`` is not empty, the mesh cannot be used, no admissible pose is found, an
             attempt with other settings stands in the way, or a file cannot be written.
     """
-    if workers < 1:
-        raise InputError(f"--workers: must be at least 1, found {workers}")
-    side_px = min(job.config.network_camera.width, job.config.network_camera.height)
-    if job.packed_px is not None and not 0 < job.packed_px < side_px:
-        raise InputError(
-            f"--packed: {job.packed_px} px must be positive and less than both sides of the image"
-        )
-    sequence_from_world = job.sequence_from_world
+    if cores < 1:
+        raise SettingError("cores", f"must be at least 1, found {cores}")
+    job = CollectJob(config.changed(backend=resolved(config.render).backend), out)
     with growing(job.out, job.settings) as part:
         if part is None:
             return
         scene = part / WORK / "scene"
         _prepare(job, scene)
         plans = _plan(job, scene, part)
-        detail = _choose_detail(job, scene, part)
-        _render(job, plans, scene / "mesh.glb", detail, part, workers)
-        if sequence_from_world is not None:
-            write_sequence_from_world(part, sequence_from_world)
+        detail = _choose_detail(job.config, scene, part)
+        _render(job.config, plans, scene / "mesh.glb", detail, part, cores)
+        if job.sequence_from_world is not None:
+            write_sequence_from_world(part, job.sequence_from_world)
         finish_dataset(
             scene / "mesh.glb",
             [part / f"{split}.csv" for split in plans],
-            job.config.network_camera,
-            job.counts,
-            job.config.shard_frames,
-            job.config.origin_of(job.scene),
+            job.config.view,
+            job.config.counts,
+            job.config.sequence_frames,
+            origin_record(
+                SCENE, job.scene, job.config.collection, job.config.render, job.config.seed
+            ),
             part / MANIFEST,
-            packed_px=job.packed_px,
+            packed_px=job.config.packed_px,
             detail=detail and detail.with_suffix(".json"),
         )
 
 
 def _prepare(job: CollectJob, scene: Path) -> None:
     """Prepare the scene, unless that is done."""
+    config, name = job.config, str(job.config.mesh)
     if not (scene / "mesh.glb").is_file():
-        config, settings = job.config, job.config.scenes[job.scene]
         agreement = config.collection.collision_agreement
-        shade = config.render.shade
-        mesh, _ = prepare_mesh(job.scene, settings, agreement, config.seed, scene, shade)
-        refuse_invisible(mesh, config.network_camera, str(settings.path), shade)
-        if config.network_masks:
-            refuse_many_instances(mesh, MOST_PATH_OBJECTS, str(settings.path))
-    effects = job.config.render.effects
-    if effects and effects.clutter:
-        if not effects.clutter.files:
+        shade = config.shade
+        mesh, _ = prepare_mesh(SCENE, job.scene, agreement, config.seed, scene, shade, name)
+        refuse_invisible(mesh, config.view, name, shade)
+        if config.masks:
+            refuse_many_instances(mesh, MOST_PATH_OBJECTS, name)
+    if config.effects and config.effects.clutter:
+        if not config.effects.clutter.files:
             save_cartons(scene / "mesh.glb")
-        crowd_of(scene / "mesh.glb", job.config.render)  # what cannot be used is refused first
+        crowd_of(scene / "mesh.glb", config.render)  # what cannot be used is refused first
 
 
 def _plan(job: CollectJob, scene: Path, part: Path) -> dict[Split, PoseTable]:
     """Plan the splits that have frames, and record what the plans cover."""
-    config, name = job.config, job.scene
-    splits = [split for split in SPLITS if job.counts[split]]
+    config = job.config
+    splits = [split for split in SPLITS if config.counts[split]]
     coverage = part / "coverage.json"
     if not coverage.is_file():  # which is written last
-        collision, camera = scene / "collision.ply", config.network_camera
-        mesh, settings, plans = load_collision_mesh(collision), config.scenes[name], {}
-        for split in splits:
-            plans[split] = plan_mesh(
+        collision = scene / "collision.ply"
+        mesh = load_collision_mesh(collision)
+        plans = {
+            split: plan_mesh(
                 mesh=mesh,
-                name=str(collision),
-                scene=settings,
+                name=str(config.mesh),
+                scene=job.scene,
                 collection=config.collection,
-                n_frames=job.counts[split],
-                rng=generator_of(config.seed, "plan", name, split),
+                n_frames=config.counts[split],
+                rng=generator_of(config.seed, "plan", SCENE, split),
                 split=split,
             )
+            for split in splits
+        }
         caster = RayCaster(*mesh)
-        refuse_blank(caster, plans, camera, settings)
-        if camera.stereo_baseline_m is not None:
-            warn_of_walls(caster, plans, camera.stereo_baseline_m, str(settings.path))
+        refuse_blank(caster, plans, config.view, job.scene)
+        if config.view.stereo_baseline_m is not None:
+            warn_of_walls(caster, plans, config.view.stereo_baseline_m, str(config.mesh))
         for split, plan in plans.items():
-            if config.collection.mode == "path":
+            if config.mode == "path":
                 warn_of_few_paths(plan, split)
             write_pose_table(part / f"{split}.csv", plan)
-        covered = {s: scene_coverage(collision, settings, plans[s], camera) for s in splits}
+        covered = {s: scene_coverage(collision, job.scene, plans[s], config.view) for s in splits}
         write_json(coverage, covered)
     return {split: read_pose_table(part / f"{split}.csv") for split in splits}
 
 
-def _choose_detail(job: CollectJob, scene: Path, part: Path) -> Path | None:
+def plan_training(config: CollectConfig) -> PoseTable:
+    """Plan the training poses that :func:`collect` renders with the same settings."""
+    mesh = load_mesh(config.mesh, config.up_axis, config.unit_m)
+    return plan_mesh(
+        mesh=merge_vertices(*mesh.merged()),
+        name=str(config.mesh),
+        scene=config.scene,
+        collection=config.collection,
+        n_frames=config.frames,
+        rng=generator_of(config.seed, "plan", SCENE, "train"),
+        split="train",
+    )
+
+
+def _choose_detail(config: CollectConfig, scene: Path, part: Path) -> Path | None:
     """Choose the mesh that colours are drawn from, unless that is done; None for the full one."""
-    config, detail = job.config, scene / "detail.glb"
+    detail = scene / "detail.glb"
     if config.render.draws_full_mesh:
         return None
     record = detail.with_suffix(".json")
     if not record.is_file():  # which is written last
-        plans = [part / f"{split}.csv" for split in SPLITS if job.counts[split]]
-        write_detail(
-            scene / "mesh.glb", plans, config.network_camera, config.render, detail, record
-        )
+        plans = [part / f"{split}.csv" for split in SPLITS if config.counts[split]]
+        write_detail(scene / "mesh.glb", plans, config.view, config.render, detail, record)
     return detail
 
 
 def _render(
-    job: CollectJob,
+    config: CollectConfig,
     plans: dict[Split, PoseTable],
     mesh: Path,
     detail: Path | None,
     part: Path,
-    workers: int,
+    cores: int,
 ) -> None:
     """Render the sequences that are not there."""
-    config = job.config
-    suffix = SUFFIX if config.archive_sequences else ""
+    suffix = SUFFIX if config.archive else ""
     tasks = [
         (part / f"{s.name}{suffix}", plans[s.split].between(s.start, s.stop))
-        for s in sequences_of(job.counts["train"], job.counts["test"], config.shard_frames)
+        for s in sequences_of(config.frames, config.test_frames, config.sequence_frames)
     ]
     missing = [(out, poses) for out, poses in tasks if not out.exists()]
     n_frames, n_missing = (sum(len(poses) for _, poses in some) for some in (tasks, missing))
-    layers = Layers(config.network_depth, config.network_normals, config.network_masks)
-    studio = Studio(mesh, config.network_camera, config.render, layers, detail)
+    layers = Layers(config.depth, config.normals, config.masks)
+    studio = Studio(mesh, config.view, config.render, layers, detail)
     with Progress(n_frames, "collect", n_frames - n_missing) as progress:
-        render_sequences(studio, missing, workers, progress)
-
-
-LEAST_INPUT_PX = 32
-SAMPLES_SEEN = (
-    14_000  # images shown to each localizer, as in the smallest set of the default profile
-)
-HEADER = """\
-# The data set of `synfeal collect` with the same options, made by the workflow:
-#   synfeal run --profile THIS_FILE -- datasets
-# It appears in {root}/datasets/{scene}/network
-"""
-TRAINED = """\
-# The five localizers trained and tested on it, up to {root}/report.html:
-#   synfeal run --profile THIS_FILE
-"""
-UNTRAINED = """\
-# There are no test frames: for localizers to be trained and tested too, give --test-frames.
-"""
-WIDE = """\
-# Localizers are trained and compared on perspective images; on these: synfeal train.
-"""
-
-
-def with_backend(config: DatasetConfig) -> DatasetConfig:
-    """Replace the backend ``auto`` by the one it stands for here, since images depend on it."""
-    return config.model_copy(update={"render": resolved(config.render)})
-
-
-def configuration_text(job: CollectJob) -> str:
-    """Write the profile as YAML with every key, as missing keys come from the default profile.
-
-    Where there are test frames, its design is one row: the localizers on this data set.
-    """
-    camera = job.config.network_camera
-    values = job.config.model_dump(mode="json")
-    # The side of packed frames, which the workflow makes for networks, has to fit into the image.
-    input_px = job.packed_px or max(LEAST_INPUT_PX, min(64, camera.width - 1, camera.height - 1))
-    values |= {"datasets": [job.scene], "network": {"input_px": input_px}}
-    is_tested = job.counts["test"] > 0 and camera.projection is None
-    if is_tested:
-        (size,) = job.config.scenes[job.scene].sizes
-        values["experiments"] = [{"table": "table4_size", "scene": job.scene, "size": size}]
-        values["training"] = {"samples_seen": {size: SAMPLES_SEEN}}
-    untrained = UNTRAINED if camera.projection is None else WIDE
-    header = HEADER + (TRAINED if is_tested else untrained)
-    named = {"root": job.config.root, "scene": job.scene}
-    return header.format(**named) + yaml.safe_dump(values, sort_keys=False)
+        render_sequences(studio, missing, cores, progress)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from synfeal.config.types import (
-    MOST_FRAMES,
     Fraction,
     Interval,
     NonNegative,
     Positive,
     Seed,
-    SizeName,
     Strict,
     ordered,
     part,
@@ -55,13 +55,6 @@ class Angles(Strict):
         return self
 
 
-class SizeConfig(Strict):
-    """Frames of a data set at full scale, as the paper prints them."""
-
-    train: int = Field(ge=1, le=MOST_FRAMES, description="training frames at scale 1")
-    test: int = Field(ge=0, le=MOST_FRAMES, description="test frames at scale 1")
-
-
 class ClutterConfig(Strict):
     """Objects that stand about, on the floor or on tables, wherever cameras can be above them."""
 
@@ -73,19 +66,39 @@ class ClutterConfig(Strict):
     seed: Seed = Field(0, description="of the layout")
 
 
+# Packages that build scenes from a seed register them here (docs/adding.md): an entry point has the
+# name of its builder and points to a function from that name and a seed to a textured mesh.
+BUILDERS = "synfeal.scene_builders"
+
+
+def installed_builder(name: str) -> str:
+    """Check that an installed package builds scenes of this name."""
+    known = sorted(entry_points(group=BUILDERS).names)
+    if name not in known:
+        raise PydanticCustomError(
+            "builder",
+            "must be a builder that is installed: {known}",
+            {"known": ", ".join(known) or "there is none"},
+        )
+    return name
+
+
+UpAxis = Literal["auto", "y", "z"]
+
+
 class SceneConfig(Strict):
     """One scene: where its mesh comes from and where the camera may go."""
 
     unless_none = ("clutter", "min_seen")
 
     source: Literal["procedural", "mesh"] = Field(description="a stand-in, or a file")
-    builder: Literal["large_room", "sanctuary", "random_room"] | None = Field(
-        None, description="procedural: which stand-in"
+    builder: Annotated[str, AfterValidator(installed_builder)] | None = Field(
+        None, description="procedural: which stand-in, by the name it was registered with"
     )
     seed: Seed | None = Field(None, description="procedural: in place of the profile's seed")
     path: Path | None = Field(None, description="mesh: the file (.glb, .gltf, .obj, .ply)")
     sha256: str | None = Field(None, pattern=r"^[0-9a-f]{64}$", description="mesh: the file's hash")
-    up_axis: Literal["auto", "y", "z"] = Field(
+    up_axis: UpAxis = Field(
         "auto", description="mesh: axis that points up; `auto`: y for glTF, else z"
     )
     unit_m: float = Field(1.0, ge=1e-6, le=1e6, description="mesh: one unit of the file, metres")
@@ -106,12 +119,11 @@ class SceneConfig(Strict):
         0.0, description="least distance of every camera from any surface; 0: the paper asks none"
     )
     clutter: ClutterConfig | None = Field(None, description="objects that stand about")
-    sizes: dict[SizeName, SizeConfig] = part(dict, "data sets by the paper's names")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.source == "procedural" and self.builder is None:
-            raise ValueError("builder: procedural scenes need large_room, sanctuary or random_room")
+            raise ValueError("builder: a scene with `source: procedural` needs the name of one")
         if self.source == "mesh" and self.path is None:
             raise ValueError("path: a scene with `source: mesh` needs the path of its mesh file")
         if self.further_boxes and self.sampling_box is None:
@@ -119,12 +131,16 @@ class SceneConfig(Strict):
         return self
 
 
+Mode = Literal["path", "random", "repeat"]
+TestPaths = Annotated[int, Field(ge=1, le=10**6)]
+
+
 class CollectionConfig(Strict):
     """Movement of the camera (section 3 of the paper)."""
 
     unless_none = ("test_paths",)
 
-    mode: Literal["path", "random", "repeat"] = Field(
+    mode: Mode = Field(
         "path",
         description="`path`: the paper's; `random`: independent poses; `repeat`: those of another"
         " data set",
@@ -139,7 +155,7 @@ class CollectionConfig(Strict):
         0.03, ge=1e-4, le=1e4, description="distance between frames (the paper's other d)"
     )
     min_path_m: NonNegative = Field(1.5, description="shorter paths are drawn again")
-    test_paths: Annotated[int, Field(ge=1, le=10**6)] | None = Field(
+    test_paths: TestPaths | None = Field(
         None,
         description="mode `path`: least number of paths that the largest test set is of, every k-th"
         " frame of whole ones; a smaller set has the first of them; null: all frames of each path,"

@@ -1,8 +1,9 @@
-"""Typed configuration of data sets: cameras, rendering, sizes."""
+"""Typed configuration of what frames are drawn with: cameras and rendering."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -15,8 +16,10 @@ from synfeal.camera.fisheye import EQUIDISTANT, largest_angle_rad, radius_of_ang
 from synfeal.camera.projection import Intrinsics, Projection, refuse_fold
 from synfeal.config.collection import CollectionConfig, SceneConfig
 from synfeal.config.effects import EffectsConfig, refuse_long_exposure
-from synfeal.config.types import Channel, Count, Finite, Positive, Seed, Slug, Strict, part
+from synfeal.config.types import Channel, Finite, Positive, Strict
 from synfeal.errors import InputError
+
+StereoBaseline = Annotated[float, Field(ge=1e-4, le=100.0)]
 
 
 class CameraConfig(Strict):
@@ -56,7 +59,7 @@ class CameraConfig(Strict):
     fisheye_k: tuple[Finite, Finite, Finite, Finite] | None = Field(
         None, description="fisheye: k1, k2, k3, k4, as OpenCV; null: equidistant"
     )
-    stereo_baseline_m: Annotated[float, Field(ge=1e-4, le=100.0)] | None = Field(
+    stereo_baseline_m: StereoBaseline | None = Field(
         None, description="draw a second camera this far to the right, too"
     )
     near_m: Positive = Field(0.05, description="near clip plane")
@@ -175,6 +178,8 @@ def _calibrated(values: dict[str, Any]) -> dict[str, Any]:
     return {**kept, **asdict(calibration), "calibration": None}
 
 
+Backend = Literal["auto", "opengl", "pyrender", "raycast"]
+Detail = Literal["auto", "full"]
 Shade = Literal["headlight", "ambient"]
 
 
@@ -183,11 +188,9 @@ class RenderConfig(Strict):
 
     unless_none = ("effects", "shade")
 
-    backend: Literal["auto", "opengl", "pyrender", "raycast"] = Field(
-        "auto", description="`auto`: the fastest that works here"
-    )
+    backend: Backend = Field("auto", description="`auto`: the fastest that works here")
     supersampling: int = Field(2, ge=1, le=4, description="samples per pixel along each axis")
-    detail: Literal["auto", "full"] = Field(
+    detail: Detail = Field(
         "auto",
         description="of the mesh that colours are drawn of: `auto` leaves out what the camera's"
         " resolution does not show, `full` nothing; depth is always that of the full mesh",
@@ -211,74 +214,58 @@ class RenderConfig(Strict):
         return self.detail == "full" or bool(light and light.states)
 
 
-class DatasetConfig(Strict):
-    """Scenes, how many frames of them, and how they are planned and drawn."""
+def refuse_effects(
+    render: RenderConfig,
+    collection: CollectionConfig,
+    camera: CameraConfig,
+    scenes: Iterable[SceneConfig],
+) -> None:
+    """Refuse effects that cannot be drawn with the other settings.
 
-    profile: Slug = Field(description="name, and directory under `results`")
-    seed: Seed = Field(0, description="root of all seeds")
-    scale: float = Field(gt=0, le=1, description="share of the paper's frames")
-    results: Path = Field(Path("results"), description="where runs are written")
-    shard_frames: Count = Field(500, description="frames of a render job, and of a sequence")
-    archive_sequences: bool = Field(False, description="write a sequence as one `seq-XX.zip`")
-    scenes: dict[Slug, SceneConfig] = Field(description="scenes by name")
-    collection: CollectionConfig = part(CollectionConfig, "camera movement")
-    network_camera: CameraConfig = part(CameraConfig, "camera of the localizers' frames")
-    network_depth: bool = Field(False, description="write its depth images too")
-    network_normals: bool = Field(False, description="write normals of surfaces too")
-    network_masks: bool = Field(False, description="write masks of parts and objects too")
-    render: RenderConfig = part(RenderConfig, "how frames are drawn")
+    Raises:
+        ValueError: One cannot; the message begins with its key below that of the effects, or with
+            the camera's ``stereo_baseline_m``.
+    """
+    if render.effects is None:
+        return
+    if camera.stereo_baseline_m is not None:
+        raise ValueError(
+            "stereo_baseline_m: effects are of one camera; leave out the effects, or draw the pair"
+            " without"
+        )
+    refuse_long_exposure(render.effects, collection, "effects")
+    light = render.effects.light
+    if not (light and light.states):
+        return
+    for scene in scenes:
+        if scene.source == "mesh":
+            raise ValueError(
+                "effects.light.states: nothing is known of the lamps of a mesh of your own; use"
+                " ev, temperature_k and field_ev"
+            )
+        if scene.clutter:
+            raise ValueError(
+                "effects.light.states: nothing is known of the light on objects; leave out the"
+                " clutter of the scenes"
+            )
 
-    @model_validator(mode="after")
-    def _check_effects(self) -> Self:
-        if self.render.effects is not None:
-            if self.network_camera.stereo_baseline_m is not None:
-                raise ValueError(
-                    "network_camera.stereo_baseline_m: effects are of one camera; leave out the"
-                    " effects, or draw the pair without"
-                )
-            refuse_long_exposure(self.render.effects, self.collection, "render.effects")
-            light = self.render.effects.light
-            if light and light.states and any(s.source == "mesh" for s in self.scenes.values()):
-                raise ValueError(
-                    "render.effects.light.states: nothing is known of the lamps of a mesh of your"
-                    " own; use ev, temperature_k and field_ev"
-                )
-            if light and light.states and any(s.clutter for s in self.scenes.values()):
-                raise ValueError(
-                    "render.effects.light.states: nothing is known of the light on objects; leave"
-                    " out the clutter of the scenes"
-                )
-        return self
 
-    @property
-    def root(self) -> Path:
-        """Directory of this profile's results."""
-        return self.results / self.profile
+def origin_record(
+    name: str, scene: SceneConfig, collection: CollectionConfig, render: RenderConfig, seed: int
+) -> dict[str, Any]:
+    """Return the settings that a data set comes from, less file names, ready for JSON.
 
-    def origin_of(self, scene: str) -> dict[str, Any]:
-        """Return the settings that a data set of a scene comes from, less file names.
-
-        Args:
-            scene: Name of the scene.
-        """
-        kept = self.scenes[scene].model_dump(mode="json", exclude={"sizes", "path", "sha256"})
-        return {
-            "scene": {"name": scene, **kept},
-            "collection": self.collection.model_dump(mode="json", exclude={"repeat"}),
-            "render": self.render.model_dump(mode="json"),
-            "seed": self.seed,
-        }
-
-    def n_frames(self, scene: str, size: str, split: str) -> int:
-        """Count the frames of a split at this profile's scale.
-
-        Args:
-            scene: Name of the scene.
-            size: Name of the size, such as ``6k``.
-            split: ``train`` or ``test``.
-
-        Returns:
-            The size's frames times ``scale``, rounded, but at least 2 if the size has as many.
-        """
-        full: int = getattr(self.scenes[scene].sizes[size], split)
-        return max(min(2, full), round(full * self.scale))
+    Args:
+        name: Name of the scene.
+        scene: Its settings.
+        collection: Movement of the camera.
+        render: How frames were drawn.
+        seed: Root of all seeds.
+    """
+    kept = scene.model_dump(mode="json", include=set(SceneConfig.model_fields) - {"path", "sha256"})
+    return {
+        "scene": {"name": name, **kept},
+        "collection": collection.model_dump(mode="json", exclude={"repeat"}),
+        "render": render.model_dump(mode="json"),
+        "seed": seed,
+    }

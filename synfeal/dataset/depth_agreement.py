@@ -69,7 +69,7 @@ class PosedDepth:
         camera: Perspective camera of the depth images.
         depth_from_cam: Rigid motion (4, 4) from the colour camera to that of depth.
         units_per_m: What a depth of one metre is stored as.
-        options: Options by which the command takes other poses or units: ``--poses-are``,
+        options: Options by which the command takes other poses or units: ``--convention``,
             ``--depth-scale``.
     """
 
@@ -227,12 +227,12 @@ def _axes_of(axes: CameraAxes) -> Callable[[Array], Array]:
 
 def _readings(options: frozenset[str]) -> tuple[tuple[Change, ...], ...]:
     """List other ways to read poses, one group for each thing that may be meant otherwise."""
-    can_choose = "--poses-are" in options
+    can_choose = "--convention" in options
     inverted = "the poses are cam_from_world: " + (
-        "give --poses-are cam_from_world" if can_choose else "invert each of them"
+        "give --convention cam_from_world" if can_choose else "invert each of them"
     )
     opengl = f"the camera's axes are {DESCRIPTIONS['opengl']}: " + (
-        "give --poses-are opengl"
+        "give --convention opengl"
         if can_choose
         else "multiply each pose by diag(1, -1, -1, 1) from the right"
     )

@@ -107,7 +107,7 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
     except BrokenProcessPool as error:
         raise InputError(
             "collect: a worker process was killed, perhaps for lack of memory; what is done is"
-            " kept: run the same command again, with fewer --workers"
+            " kept: run the same command again, with fewer --cores"
         ) from error
     finally:
         stop.set()

@@ -85,7 +85,7 @@ def crowd_of(mesh: Path, render: RenderConfig) -> Crowd | None:
     kinds = [(f.stem, load_mesh(f)) for f in settings.files or carton_files(mesh)]
     for name, kind in kinds:
         size_m = np.ptp(kind.bounds_m, axis=0)
-        refuse_larger(size_m, scene, f"render.effects.clutter.files: {name}")
+        refuse_larger(size_m, scene, f"effects.clutter.files: {name}")
     return Crowd(scene, kinds, settings.count, placed_objects(mesh))
 
 

@@ -161,6 +161,9 @@ def figure_of(title: str, found: Evaluation) -> Figure:
     return figure
 
 
+FILES = ("scores.csv", "errors.csv", "errors.png")
+
+
 def write_files(out: Sequence[Path], title: str, found: Evaluation) -> None:
     """Write scores, errors and the figure.
 

@@ -9,14 +9,15 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.config.collect import SCENE, TEST_PATHS, CollectConfig, checked
 from synfeal.config.collection import Box, CollectionConfig, SceneConfig
 from synfeal.config.dataset import CameraConfig, RenderConfig, Shade
-from synfeal.config.options import SCENE, TEST_PATHS
+from synfeal.config.flags import as_options
 from synfeal.dataset.images import is_of_one_color
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.sevenscenes import Split
@@ -104,25 +105,30 @@ class Suggestion:
 
     def command(self, out: str) -> str:
         """Return the complete line that collects what was planned, ready for a shell."""
-        scene, words = self.scene, ["synfeal", "collect", "--mesh", str(self.scene.path)]
-        if scene.up_axis != "auto":
-            words += ["--up-axis", scene.up_axis]
-        if scene.unit_m != 1.0:
-            words += ["--unit-m", f"{scene.unit_m:g}"]
-        for box_m in self.boxes_m:
-            words += ["--box", *(f"{value:z.2f}" for value in box_m.T.ravel())]
-        if self.is_narrow:
-            words += ["--min-path", f"{self.collection.min_path_m:g}"]
-            words += ["--min-view-distance", f"{scene.min_view_distance_m:g}"]
-        if scene.min_clearance_m:
-            words += ["--min-clearance", f"{scene.min_clearance_m:g}"]
-        if scene.min_seen:
-            words += ["--min-seen", f"{scene.min_seen:g}"]
-        if self.shade:
-            words += ["--shade", self.shade]
-        words += ["--spacing", f"{self.collection.frame_spacing_m:g}"]
-        words += ["--frames", str(COUNTS["train"]), "--test-frames", str(COUNTS["test"])]
-        return shlex.join([*words, "--depth", "--out", out])
+        settings = self.settings
+        mesh, *options = as_options(settings)[1:]  # an argument without its flag
+        return shlex.join(["synfeal", "collect", mesh, *options, "--out", out])
+
+    @property
+    def settings(self) -> CollectConfig:
+        """Settings of the collection that was planned; those that are the default are not given."""
+        scene, movement = self.scene, self.collection
+        chosen: dict[str, Any] = {
+            "mesh": scene.path,
+            "up_axis": scene.up_axis,
+            "unit_m": scene.unit_m,
+            "box": [tuple(float(f"{m:z.2f}") for m in box.T.ravel()) for box in self.boxes_m],
+            "min_path_m": movement.min_path_m,
+            "min_view_distance_m": scene.min_view_distance_m,
+            "min_clearance_m": scene.min_clearance_m or None,
+            "min_seen": scene.min_seen or None,
+            "shade": self.shade,
+            "spacing_m": movement.frame_spacing_m,
+            "frames": COUNTS["train"],
+            "test_frames": COUNTS["test"],
+            "depth": True,
+        }
+        return checked(CollectConfig, chosen)
 
 
 def suggest(

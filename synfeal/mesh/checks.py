@@ -46,7 +46,7 @@ def refuse_colorless(mesh: TexturedMesh, name: str) -> None:
     if not painted and len({part.base_color.tobytes() for part in mesh.parts}) == 1:
         raise InputError(
             f"{name}: has neither a texture nor vertex colours; images would be of one colour."
-            " Export it with its texture, or set render.shade to headlight, which shows its shape"
+            " Export it with its texture, or give the shade headlight, which shows its shape"
         )
 
 
@@ -92,8 +92,8 @@ def check_sampling_box(box: NDArray[np.float64], bounds_m: NDArray[np.float64], 
         return
     problem = "lies outside" if (overlap <= 0).any() else f"is {ratio:.0f} times smaller than"
     raise InputError(
-        f"{name}: sampling_box {_show(box)} m {problem} the mesh, which spans {_show(bounds_m)} m;"
-        " unit_m or up_axis is probably wrong"
+        f"{name}: the sampling box {_show(box)} m {problem} the mesh, which spans"
+        f" {_show(bounds_m)} m; unit_m or up_axis is probably wrong"
     )
 
 

@@ -90,7 +90,7 @@ class PairsJob:
         if self.choice.per_frame is not None and self.choice.per_frame < 1:
             raise InputError(f"--per-frame: must be at least 1, found {self.choice.per_frame}")
         if self.every < 1:
-            raise InputError(f"--every: must be at least 1, found {self.every}")
+            raise InputError(f"--stride: must be at least 1, found {self.every}")
         if not 0.0 < self.tolerance < 1.0:
             raise InputError(f"--tolerance: must be above 0 and below 1, found {self.tolerance:g}")
         if not all(2 <= side <= 8192 for side in self.grid):
@@ -135,7 +135,7 @@ def find_pairs(job: PairsJob) -> Found:
     if len(frames) > MOST_FRAMES:
         raise InputError(
             f"{job.dataset}: has {len(frames)} frames, and at most {MOST_FRAMES} are compared;"
-            f" give --every {math.ceil(job.every * len(frames) / MOST_FRAMES)}"
+            f" give --stride {math.ceil(job.every * len(frames) / MOST_FRAMES)}"
         )
     _refuse_fine_grid(job.grid, frames)
     if not any(len(group) > 1 for group in groups):
@@ -166,7 +166,7 @@ def _refuse_fine_grid(grid: tuple[int, int], frames: DepthFrames) -> None:
     if (count := columns * rows * len(frames)) > MOST_POINTS:
         raise InputError(
             f"--grid: {count:.2g} points of {len(frames)} frames are more than {MOST_POINTS:.0e};"
-            " give fewer, or --every"
+            " give fewer, or --stride"
         )
 
 

@@ -22,7 +22,7 @@ from synfeal.config.load import describe
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.dataset.world import read_scan_record, rigid_motion_of
-from synfeal.errors import InputError, read_as
+from synfeal.errors import InputError, SettingError, read_as
 from synfeal.geometry.axes import meant_poses
 from synfeal.geometry.poses import inverse
 from synfeal.geometry.rotations import BODY_FROM_CAM
@@ -33,7 +33,6 @@ Array = NDArray[np.float64]
 # the least share of it that the scan shows: at the border of a scan cameras could look past it.
 MIN_VIEW_DISTANCE_M, MIN_SEEN = 0.8, 0.85
 FULL_TURN_DEG, STEEPEST_DEG = 330.0, 89.0
-MOST_MARGIN_M, MOST_MARGIN_DEG = 1000.0, 360.0
 
 
 @dataclass(frozen=True)
@@ -73,14 +72,8 @@ def like_trajectory(
         margin_deg: Added to the bounds of the angles on both sides, degrees.
 
     Raises:
-        InputError: The sequence cannot be read, or a margin is negative.
+        InputError: The sequence cannot be read.
     """
-    for flag, margin, most in (
-        ("--margin", margin_m, MOST_MARGIN_M),
-        ("--angle-margin", margin_deg, MOST_MARGIN_DEG),
-    ):
-        if not 0 <= margin <= most:
-            raise InputError(f"{flag}: must be 0 to {most:g}, found {margin:g}")
     poses = read_posed_sequence(sequence, frames).world_from_cam
     record = read_scan_record(mesh)
     if record is not None:
@@ -159,16 +152,17 @@ def resized(camera: CameraConfig, width: int | None, height: int | None) -> Came
             panorama.
     """
     if camera.projection is not None:
-        raise InputError(
-            f"--like: its camera is {camera.projection}; give --camera FILE, or --projection and"
-            " --fov"
+        raise SettingError(
+            "like",
+            f"its camera is {camera.projection}; give a calibration, or projection and field of"
+            " view",
         )
     fx, fy, cx, cy = camera.intrinsics
     lens = Calibration(camera.width, camera.height, fx, fy, cx, cy, camera.distortion)
     try:
         small = lens.scaled(width, height)
     except ValueError as error:
-        raise InputError(f"--width: the camera of --like {error}") from error
+        raise SettingError("width", f"the camera to be like {error}") from error
     return camera.model_copy(
         update={
             "width": small.width,

@@ -146,14 +146,14 @@ def plan_split(
     longest_m = float(np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1).max())
     if collection.mode == "path" and collection.frame_spacing_m > longest_m:
         raise InputError(
-            f"plan: frame_spacing_m ({collection.frame_spacing_m:g} m) is longer than any path in"
-            f" sampling_box ({longest_m:.3g} m across); lower it"
+            f"plan: the frame spacing ({collection.frame_spacing_m:g} m) is longer than any path in"
+            f" the sampling box ({longest_m:.3g} m across); lower it"
         )
     if collection.mode == "path" and longest_m / collection.frame_spacing_m > MOST_OF_PATH:
         raise InputError(
-            f"plan: a path across sampling_box ({longest_m:.3g} m) would have more than"
-            f" {MOST_OF_PATH} frames; raise frame_spacing_m ({collection.frame_spacing_m:g} m), or"
-            " give another unit_m"
+            f"plan: a path across the sampling box ({longest_m:.3g} m) would have more than"
+            f" {MOST_OF_PATH} frames; raise the frame spacing ({collection.frame_spacing_m:g} m),"
+            " or give another unit_m"
         )
     # One generator for each box, so that none shifts another's numbers.
     generators = [rng] if len(boxes) == 1 else rng.spawn(len(boxes))
@@ -271,7 +271,7 @@ def _stuck(at: Array, space: PoseSpace, collection: CollectionConfig) -> InputEr
         f"plan: no admissible target from ({where}) in {collection.max_tries} rounds of"
         f" {collection.candidates} candidates; lower min_path_m ({collection.min_path_m} m)"
         f" or min_view_distance_m ({space.min_view_distance_m} m){_or_clearance(space)},"
-        " or widen sampling_box"
+        " or widen the sampling box"
     )
 
 

@@ -14,7 +14,7 @@ from pkgutil import resolve_name
 import numpy as np
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
-from synfeal.errors import InputError
+from synfeal.errors import InputError, SettingError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render.base import Renderer, UnavailableError
 
@@ -67,8 +67,8 @@ def open_renderer(
     name = fastest_working() if render.backend == "auto" else render.backend
     failure = why_not(name)
     if failure is not None:
-        raise InputError(
-            f"render.backend: {render.backend} does not work here: {failure}; or choose auto"
+        raise SettingError(
+            "backend", f"{render.backend} does not work here: {failure}; or choose auto"
         )
     return BACKENDS[name](mesh, camera, render)
 
@@ -86,9 +86,9 @@ def fastest_working() -> str:
         if failure is None:
             log.info("rendering with %s, the fastest backend that works here", name)
             return name
-        log.warning("render.backend: %s does not work here: %s", name, failure)
+        log.warning("backend: %s does not work here: %s", name, failure)
         failures.append(f"{name}: {failure}")
-    raise InputError(f"render.backend: no renderer works here: {'; '.join(failures)}")
+    raise SettingError("backend", f"no renderer works here: {'; '.join(failures)}")
 
 
 @functools.cache
@@ -100,7 +100,7 @@ def why_not(name: str) -> str | None:
     except InputError as error:
         return str(error)
     except _errors_of_a_machine() as error:
-        log.debug("render.backend: %s does not work here", name, exc_info=True)
+        log.debug("backend: %s does not work here", name, exc_info=True)
         return " ".join(f"{error}; {INSTALL[name]}".split())
     if (rgb != [255, 0, 0]).any() or not np.allclose(depth_m, 1.0, atol=1e-3):
         return "it draws a red square wrongly"

@@ -40,7 +40,7 @@ from synfeal.scanning.gravity import find_gravity, upright_world
 from synfeal.scanning.picture import Comparison, compare, write_picture
 
 Array = NDArray[np.float64]
-OPTIONS = frozenset({"--poses-are", "--depth-scale"})
+OPTIONS = frozenset({"--convention", "--depth-scale"})
 COMPARED = 24  # photographs that the scan is compared with
 # Beyond, a focal length is not that of the camera: tolerances of lenses are a tenth of it.
 WRONG_FOCAL = 0.03
@@ -89,7 +89,7 @@ class ScanJob:
         if self.out.suffix.lower() != ".glb":
             raise InputError(f"--out: {self.out}: a scan is binary glTF; end its name in .glb")
         if self.start < 0 or (self.stop is not None and self.stop <= self.start):
-            raise InputError(f"--frames: {self.start} to {self.stop} holds no frame")
+            raise InputError(f"--range: {self.start} to {self.stop} holds no frame")
         if self.stride < 1:
             raise InputError(f"--stride: must be at least 1, found {self.stride}")
         for flag, value in (
@@ -257,7 +257,7 @@ def _tell(
     covered = float(np.mean([one.covered.mean() for one in compared]))
     if covered < WARN_COVERED:
         log.warning(
-            "scan: covers %.0f %% of what photographs show; give more --frames or a larger"
+            "scan: covers %.0f %% of what photographs show; give more frames, or a larger"
             " --max-depth (%g m)",
             100 * covered,
             job.max_depth_m,

@@ -282,9 +282,9 @@ def test_what_cannot_be_mapped_is_told_in_one_line(place, tmp_path, capsys):
     assert "--depth" in refused(capsys, "map", tmp_path / "flat", "--out", out)
     (tmp_path / "empty").mkdir()
     assert str(tmp_path / "empty") in refused(capsys, "map", tmp_path / "empty", "--out", out)
-    few = ("--frames", "90", "99")
-    assert "--frames" in refused(capsys, "map", place / "frames", *few, "--out", out)
-    assert "--every" in refused(capsys, "map", place / "frames", "--every", "0", "--out", out)
+    few = ("--range", "90", "99")
+    assert "--range" in refused(capsys, "map", place / "frames", *few, "--out", out)
+    assert "--stride" in refused(capsys, "map", place / "frames", "--stride", "0", "--out", out)
     assert str(place / "map") in refused(
         capsys, "map", place / "frames", "--out", place / "map"
     )  # holds a map
@@ -346,5 +346,5 @@ def test_frames_are_chosen_by_range_stride_and_number():
     spread = FrameChoice(most=4).rows(100)
     assert (spread[0], spread[-1], len(spread)) == (0, 99, 4)
     assert np.ptp(np.diff(spread)) <= 1
-    with pytest.raises(InputError, match="--frames"):
+    with pytest.raises(InputError, match="--range"):
         FrameChoice(start=5, stop=5)

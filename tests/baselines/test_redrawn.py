@@ -57,7 +57,7 @@ def place(tmp_path_factory):
     write_photographs(folder / "elsewhere", furnished_room(PAINT, seed=9), room_poses(N_PHOTOS, 2))
     write_calibration(folder / "photo.json", PHOTO)
     inner = np.column_stack([0.3 * SIZE_M, 0.7 * SIZE_M]).ravel()
-    collect = ["collect", "--mesh", folder / "room.glb", "--out", folder / "frames", "--depth"]
+    collect = ["collect", folder / "room.glb", "--out", folder / "frames", "--depth"]
     size = ["--width", 176, "--height", 132, "--mode", "random"]
     frames = ["--frames", 40, "--box", *inner, "--min-view-distance", 0.5]
     assert main([str(word) for word in (*collect, *size, *frames)]) == 0

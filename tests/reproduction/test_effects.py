@@ -222,7 +222,7 @@ def test_collected_with_effects_the_same_in_other_shards_and_workers(tmp_path):
     settings.write_text(yaml.safe_dump({**ALL, "share": 1.0}))
     one, other = tmp_path / "one", tmp_path / "other"
     assert collect(mesh, one, "--effects", str(settings), "--depth") == 0
-    apart = ("--sequence-frames", "7", "--workers", "2")
+    apart = ("--sequence-frames", "7", "--cores", "2")
     assert collect(mesh, other, "--effects", str(settings), "--depth", *apart) == 0
     found, again = ([path.read_bytes() for path in color_files(out)] for out in (one, other))
     assert found == again

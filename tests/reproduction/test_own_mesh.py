@@ -19,11 +19,12 @@ from reproduction.tables import assistance, label_error
 from reproduction.tables.columns import side_sheet
 from reproduction.tables.sheet import Sheet, sheet_latex, sheet_markdown
 from reproduction.tables.speed_vs_error import speeds_of
+from synfeal.cli import main
 from synfeal.collection.collision import CURVE_HEADER
 from synfeal.errors import InputError
 from synfeal.records.tables import frame_of
 from tests import CONFIG, ROOT
-from tests.support.collected import collect, save_room
+from tests.support.collected import command, save_room
 from tests.support.report_page import large_room_design, page_results
 from tests.support.report_results import design_of
 
@@ -178,9 +179,14 @@ def test_rows_in_the_configuration_are_those_of_a_table_in_a_file(tmp_path):
     assert read_design(inline) == read_design(in_file)
 
 
+def profiled(mesh, out, *more):
+    """Exit status of ``synfeal profile`` with the options of a small collection."""
+    return main(["profile", *command(mesh, out, *more)[1:]])
+
+
 def test_the_configuration_that_collect_prints_trains(tmp_path, capsys):
     mesh = save_room(tmp_path / "room.glb")
-    assert collect(mesh, tmp_path / "mine", "--print-config") == 0
+    assert profiled(mesh, tmp_path / "mine") == 0
     printed = tmp_path / "printed.yaml"
     printed.write_text(capsys.readouterr().out)
     jobs = jobs_of(dry_run(printed, "--config", f"results={tmp_path}/results"))
@@ -191,7 +197,7 @@ def test_the_configuration_that_collect_prints_trains(tmp_path, capsys):
 
 def test_without_test_frames_the_printed_configuration_says_what_training_needs(tmp_path, capsys):
     mesh = save_room(tmp_path / "room.glb")
-    assert collect(mesh, tmp_path / "mine", "--test-frames", "0", "--print-config") == 0
+    assert profiled(mesh, tmp_path / "mine", "--test-frames", "0") == 0
     text = capsys.readouterr().out
     assert "give --test-frames" in text
     assert "experiments" not in yaml.safe_load(text)

@@ -11,6 +11,7 @@ from baselines.config.references import ReferencesConfig
 from baselines.references.descriptors import write_descriptors
 from baselines.references.registry import REFERENCES
 from baselines.references.robustness import SCHEMA, robustness_table
+from reproduction.config.robustness import MIXED
 from reproduction.design.experiments import Design
 from reproduction.design.references import answered_by
 from reproduction.figures.error_by_method import references_by_noise
@@ -26,7 +27,7 @@ from reproduction.tables.references import (
 from reproduction.tables.robustness import printed
 from reproduction.tables.sheet import sheet_latex
 from reproduction.tables.side import write_side_table
-from synfeal.config.effects import CLEAN, MIXED
+from synfeal.config.effects import CLEAN
 from synfeal.dataset.packed import new_packed
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.records.files import write_json

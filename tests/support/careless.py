@@ -35,10 +35,10 @@ CONFIGURATION_FILES = (
     *(name for name in FILES if name.endswith(".yaml")),
 )
 
-COLLECT = "collect --mesh room.glb --frames 2 --out new --width 40 --height 33"
+COLLECT = "collect room.glb --frames 2 --out new --width 40 --height 33"
 # A command that works, an option of it (or the place of an argument), and values that do not.
 TABLE = {
-    "collect mesh": (COLLECT, "--mesh", MESHES),
+    "collect mesh": (COLLECT.replace("room.glb", "{}"), "", MESHES),
     "collect out": (COLLECT, "--out", OUTS),
     "collect frames": (COLLECT, "--frames", WHOLE),
     "collect test frames": (COLLECT, "--test-frames", ("-1", "99999999999")),
@@ -46,8 +46,8 @@ TABLE = {
     "collect clearance": (COLLECT, "--min-clearance", ("-1", "nan", "inf", "1e30")),
     "collect view": (COLLECT, "--min-view-distance", ("-1", "nan", "inf", "1e30")),
     "collect path": (COLLECT, "--min-path", ("-1", "nan", "inf", "1e30")),
-    "collect unit": (COLLECT, "--unit-m", (*NUMBERS, "1e-5")),
-    "collect box": (COLLECT, "--box", ("1 0 0 1 0 1", "nan 1 0 1 0 1", "50 51 0 1 0 1")),
+    "collect unit": (COLLECT, "--unit", (*NUMBERS, "1e-5")),
+    "collect box": (COLLECT, "--box", ("1 0 0 1 0 1", "nan 1 0 1 0 1")),
     "collect roll": (COLLECT, "--roll", ("5 -5", "nan 1", "0 inf")),
     "collect pitch": (COLLECT, "--pitch", ("-90 90", "1 1")),
     "collect yaw": (COLLECT, "--yaw", ("180 -180",)),
@@ -62,13 +62,13 @@ TABLE = {
     "collect clutter": (COLLECT, "--clutter", (*PLACES, *TEXTS)),
     "collect background": (COLLECT, "--background", ("0 0 256", "-1 0 0")),
     "collect supersampling": (COLLECT, "--supersampling", ("0", "-1", "5", "9" * 400)),
-    "collect workers": (COLLECT, "--workers", ("0", "-3")),
+    "collect workers": (COLLECT, "--cores", ("0", "-3")),
     "collect packed": (COLLECT, "--packed", ("0", "-5", "33", "100000", "9" * 400)),
     "collect sequences": (COLLECT, "--sequence-frames", WHOLE),
     "inspect mesh": ("inspect {}", "", MESHES),
     "inspect out": ("inspect room.glb", "--out", OUTS),
-    "inspect unit": ("inspect room.glb", "--unit-m", NUMBERS),
-    "inspect box": ("inspect room.glb", "--box", ("1 0 0 1 0 1", "50 51 0 1 0 1")),
+    "inspect unit": ("inspect room.glb", "--unit", NUMBERS),
+    "inspect box": ("inspect room.glb", "--box", ("1 0 0 1 0 1",)),
     "preview": ("preview {} --out new.gif", "", DATA_SETS),
     "preview out": ("preview set", "--out", ("notes.txt", "absent/x/y.avi", "x" * 300)),
     "preview frames": ("preview set --out new.gif", "--frames", ("0", "-1")),

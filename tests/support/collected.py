@@ -30,7 +30,7 @@ def save_room(path, seed=0):
 def command(mesh, out, *more):
     """24 training and 8 test frames, in four sequences."""
     frames = ("--frames", "24", "--test-frames", "8")
-    return ["collect", "--mesh", str(mesh), "--out", str(out), *frames, *SMALL, *more]
+    return ["collect", str(mesh), "--out", str(out), *frames, *SMALL, *more]
 
 
 def collect(mesh, out, *more):

@@ -60,7 +60,7 @@ def obj_without_its_mtl(folder):
 def test_what_is_certainly_blank_is_refused_before_rendering(make, words, tmp_path, capsys, caplog):
     mesh = make(tmp_path)
     before = sorted(tmp_path.iterdir())
-    line = refused(capsys, "collect", "--mesh", mesh, "--out", tmp_path / "set", *SMALL)
+    line = refused(capsys, "collect", mesh, "--out", tmp_path / "set", *SMALL)
     assert all(word in line for word in words), line
     assert sorted(tmp_path.iterdir()) == before
 
@@ -76,7 +76,7 @@ def open_room():
 def test_collect_always_says_how_many_pixels_are_empty(mesh, warns, tmp_path, capsys, caplog):
     path, out = save(tmp_path / "room.glb", mesh), tmp_path / "set"
     with caplog.at_level(logging.WARNING):
-        assert main(["collect", "--mesh", str(path), "--out", str(out), *SMALL]) == 0
+        assert main(["collect", str(path), "--out", str(out), *SMALL]) == 0
     share = json.loads((out / "coverage.json").read_text())["train"]["empty_pixels"]["share"]
     assert (share > 0.1) == warns
     assert f"empty pixels: {share:.1%}" in capsys.readouterr().out
@@ -90,7 +90,7 @@ def test_what_helps_against_empty_pixels_is_not_what_was_given(tmp_path, caplog,
     path, box = save(tmp_path / "room.glb", open_room()), ["-2.5", "2.5", "-2", "2", "-0.5", "0.5"]
     for more, remedy in (([], "--min-seen 0.9"), (["--min-seen", "0.9"], "--pitch")):
         caplog.clear()
-        command = ["collect", "--mesh", str(path), "--box", *box, *SMALL, *more]
+        command = ["collect", str(path), "--box", *box, *SMALL, *more]
         assert main([*command, "--out", str(tmp_path / f"set{len(more)}")]) == 0
         said = [line for line in caplog.messages if "will be empty" in line]
         assert all(remedy in line and "synfeal inspect" not in line for line in said)
@@ -108,7 +108,7 @@ def test_what_helps_against_empty_pixels_is_not_what_was_given(tmp_path, caplog,
 def test_few_paths_are_said_before_they_are_rendered(frames, words, tmp_path, capsys, caplog):
     path, out = save(tmp_path / "room.glb", box_room()), tmp_path / "set"
     size = ("--width", "32", "--height", "24", "--test-frames", "16")
-    assert main(["collect", "--mesh", str(path), "--out", str(out), *frames, *size]) == 0
+    assert main(["collect", str(path), "--out", str(out), *frames, *size]) == 0
     said = [line for line in caplog.messages if "straight path" in line]
     assert bool(said) == bool(words)
     assert all(word in said[0] for word in words)

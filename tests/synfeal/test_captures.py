@@ -297,7 +297,7 @@ def test_scanned_without_an_option_it_is_the_room(name, tmp_path):
 def test_the_command_says_what_it_found_and_what_comes_next(tmp_path, capsys, caplog):
     path, _ = written("3d-scanner-app", tmp_path)
     out = tmp_path / "sequence"
-    assert main(["unpack", str(path), "--out", str(out), "--every", "4"]) == 0
+    assert main(["unpack", str(path), "--out", str(out), "--stride", "4"]) == 0
     said = capsys.readouterr().out
     assert "40 frames of 3d Scanner App" in said
     assert f"{out}: 10 frames, 240 x 180 pixels, focal length 180, depth 120 x 90" in said
@@ -308,7 +308,7 @@ def test_the_command_says_what_it_found_and_what_comes_next(tmp_path, capsys, ca
 
 @pytest.mark.parametrize(
     ("options", "said"),
-    [(["--every", "0"], "--every"), (["--format", "fbx"], "fbx is none of tum, 7scenes")],
+    [(["--stride", "0"], "--stride"), (["--format", "fbx"], "fbx is none of tum, 7scenes")],
 )
 def test_bad_options_are_one_line_and_write_nothing(options, said, tmp_path, capsys):
     path, _ = written("colmap", tmp_path)

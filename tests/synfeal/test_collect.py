@@ -23,7 +23,7 @@ from synfeal.errors import InputError
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.validation.manifest import check_manifest
 from tests import ROOT
-from tests.support.collected import collect, refused, tree_of
+from tests.support.collected import collect, command, refused, tree_of
 from tests.workflow.test_workflow import snakemake
 
 
@@ -49,7 +49,7 @@ def test_collect_makes_a_complete_data_set(calm):
     assert [path.name for path in calm.parent.iterdir()] == ["set"]
 
 
-@pytest.mark.parametrize("more", [(), ("--workers", "2")], ids=["again", "processes"])
+@pytest.mark.parametrize("more", [(), ("--cores", "2")], ids=["again", "processes"])
 def test_the_same_command_gives_the_same_bytes(mesh, calm, tmp_path, more):
     assert collect(mesh, tmp_path / "set", "--depth", *more) == 0
     assert tree_of(tmp_path / "set") == tree_of(calm)
@@ -59,7 +59,8 @@ def test_the_same_command_gives_the_same_bytes(mesh, calm, tmp_path, more):
 def test_the_workflow_makes_the_same_bytes_from_the_printed_configuration(
     mesh, calm, tmp_path, capsys
 ):
-    assert collect(mesh, tmp_path / "set", "--depth", "--print-config") == 0
+    _, *asked = command(mesh, tmp_path / "set", "--depth")
+    assert main(["profile", *asked]) == 0
     profile = tmp_path / "mine.yaml"
     profile.write_text(capsys.readouterr().out)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.yaml"]
@@ -177,13 +178,13 @@ def test_the_quick_start_runs(tmp_path):
 
 
 def test_the_functions_make_what_the_command_makes(mesh, calm, tmp_path):
-    options = {"width": 40, "height": 33, "spacing": 0.2, "sequence_frames": 10, "depth": True}
+    options = {"width": 40, "height": 33, "spacing_m": 0.2, "sequence_frames": 10, "depth": True}
     data = synfeal.collect(mesh, tmp_path / "called", 24, test_frames=8, **options)
     assert tree_of(data.path) == tree_of(calm)
     assert data.test.images[0] == data.path / "seq-04" / "frame-000000.color.png"
-    with pytest.raises(InputError, match=r"^--spacing: "):
-        synfeal.plan(mesh, 10, spacing=-1)
-    with pytest.raises(InputError, match=r"^colour: no such option"):
+    with pytest.raises(InputError, match=r"^spacing_m: "):
+        synfeal.plan(mesh, 10, spacing_m=-1)
+    with pytest.raises(InputError, match=r"^color: no such option"):
         synfeal.plan(mesh, 10, color="red")
 
 

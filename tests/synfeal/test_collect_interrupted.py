@@ -97,8 +97,8 @@ def test_a_collection_survives_being_killed(mesh, calm, tmp_path):
 
 def test_a_worker_that_is_killed_is_one_line(mesh, tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(render_pool, "_start_worker", suicide)
-    assert collect(mesh, tmp_path / "set", "--workers", "2") == 1
-    assert "fewer --workers" in only_error(capfd)
+    assert collect(mesh, tmp_path / "set", "--cores", "2") == 1
+    assert "fewer --cores" in only_error(capfd)
     assert (tmp_path / "set.part" / "train.csv").is_file()
 
 
@@ -112,7 +112,7 @@ def small_disk(tmp_path):
         yield disk
 
 
-@pytest.mark.parametrize("more", [(), ("--workers", "2")], ids=["alone", "processes"])
+@pytest.mark.parametrize("more", [(), ("--cores", "2")], ids=["alone", "processes"])
 def test_a_full_disk_is_one_line_and_the_collection_goes_on_when_there_is_room(
     mesh, calm, small_disk, capfd, more
 ):

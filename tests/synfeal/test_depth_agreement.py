@@ -148,8 +148,8 @@ def test_every_command_refuses(
     out = str(tmp_path / "out")
     sequence = str(wrong / "seq-01")
     for arguments, remedy in (
-        (["map", sequence, "--color-focal", "70", "--out", out], "give --poses-are opengl"),
-        (["scan", sequence, "--color-focal", "70", "--out", f"{out}.glb"], "--poses-are opengl"),
+        (["map", sequence, "--color-focal", "70", "--out", out], "give --convention opengl"),
+        (["scan", sequence, "--color-focal", "70", "--out", f"{out}.glb"], "--convention opengl"),
         (["pairs", str(wrong), "--out", out], "multiply each pose by diag(1, -1, -1, 1)"),
         (["train", sequence, "--focal", "70", "--out", out], "multiply each pose by diag"),
     ):
@@ -169,7 +169,7 @@ def test_validate_names_the_axes(wrong: Path, capsys: pytest.CaptureFixture[str]
 
 def test_map_takes_the_poses_as_told(wrong: Path, tmp_path: Path) -> None:
     out = tmp_path / "map"
-    given = ["--color-focal", "70", "--poses-are", "opengl", "--out", str(out)]
+    given = ["--color-focal", "70", "--convention", "opengl", "--out", str(out)]
     assert main(["map", str(wrong / "seq-01"), *given]) == 0
     row = (out / "frames.csv").read_text().splitlines()[1].split(",")
     np.testing.assert_allclose(np.array(row[2:5], float), TRUE[0, :3, 3], atol=1e-6)

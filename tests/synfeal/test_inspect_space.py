@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from synfeal.config.options import scene_config
+from synfeal.config.collect import PlaceConfig
 from synfeal.errors import InputError
 from synfeal.inspection.boxes import (
     UNWANTED_WEIGHT,
@@ -257,7 +257,7 @@ def test_sizes_that_are_not_metres_are_doubted(extents, unit_m, words):
 def test_a_unit_is_assumed_only_where_it_makes_a_room(tmp_path, side, taken):
     """Of 60,000 km no unit does: then nothing is assumed, and no advice contradicts it."""
     trimesh.creation.box((side, side, 0.6 * side)).export(tmp_path / "box.ply")
-    scene = scene_config({"mesh": tmp_path / "box.ply"})
+    scene = PlaceConfig(mesh=tmp_path / "box.ply").scene
     scene, mesh, notes = load_as_meant(scene, unit_is_given=False)
     assert scene.unit_m == taken
     assert bool(notes) == (taken != 1.0)
@@ -268,7 +268,7 @@ def test_a_unit_is_assumed_only_where_it_makes_a_room(tmp_path, side, taken):
 
 def test_terrain_is_no_room_in_inches(tmp_path):
     trimesh.creation.box((400.0, 400.0, 12.0)).export(tmp_path / "box.ply")
-    scene, _, notes = load_as_meant(scene_config({"mesh": tmp_path / "box.ply"}), False)
+    scene, _, notes = load_as_meant(PlaceConfig(mesh=tmp_path / "box.ply").scene, False)
     assert scene.unit_m == 1.0
     assert notes == []
 

@@ -258,7 +258,7 @@ def test_an_unlisted_instance_a_missing_file_and_a_damaged_table_are_named(
 
 def test_what_a_data_set_lacks_is_said(tmp_path, capfd):
     room = save_room(tmp_path / "room.glb")
-    data = synfeal.collect(room, tmp_path / "set", 2, width=40, height=33, spacing=0.2)
+    data = synfeal.collect(room, tmp_path / "set", 2, width=40, height=33, spacing_m=0.2)
     with pytest.raises(InputError, match="normals: the data set has none; collect it with"):
         data.train.normals_cam(0)
     with pytest.raises(InputError, match=r"masks.json: cannot be read"):

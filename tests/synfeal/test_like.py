@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from synfeal.cli import main
+from synfeal.config.collect import LikeConfig, checked
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.world import read_scan_record
 from synfeal.errors import InputError
@@ -101,8 +102,8 @@ def test_records_of_others_are_passed_over(tmp_path: Path) -> None:
 def test_sides_that_do_not_fit_and_negative_margins(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="aspect ratio"):
         resized(CameraConfig(width=640, height=480), 320, 200)
-    with pytest.raises(InputError, match="--margin"):
-        like_trajectory(tmp_path / "a.glb", tmp_path, None, -0.1, 0.0)
+    with pytest.raises(InputError, match=r"^margin_m: must be 0 or more"):
+        checked(LikeConfig, {"like": tmp_path, "margin_m": -0.1})
 
 
 def test_seen_share_of_half_a_wall() -> None:
@@ -116,6 +117,6 @@ def test_seen_share_of_half_a_wall() -> None:
 
 
 def test_margins_go_with_like(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["collect", "--mesh", "a.glb", "--frames", "5", "--out", str(tmp_path / "out")]
+    asked = ["collect", "a.glb", "--frames", "5", "--out", str(tmp_path / "out")]
     assert main([*asked, "--margin", "0.1"]) == 1
-    assert capsys.readouterr().err == "error: --margin: goes with --like SEQUENCE\n"
+    assert capsys.readouterr().err == "error: --margin: goes with a sequence to be like\n"

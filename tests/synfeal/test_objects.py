@@ -68,7 +68,7 @@ def test_every_path_has_objects_of_its_own_out_of_the_cameras_way(tmp_path):
     short = ("--spacing", "0.5")  # many paths
     assert collect(mesh, tmp_path / "bare", *short) == 0
     assert collect(mesh, tmp_path / "set", *short, "--effects", str(settings)) == 0
-    apart = (*short, "--sequence-frames", "7", "--workers", "2")
+    apart = (*short, "--sequence-frames", "7", "--cores", "2")
     assert collect(mesh, tmp_path / "again", "--effects", str(settings), *apart) == 0
     frames = {
         name: [path.read_bytes() for path in frame_paths(read_split(tmp_path / name, "train"), C)]

@@ -269,8 +269,8 @@ def test_the_command_writes_a_table_a_list_and_flow(data_set, tmp_path, capsys):
     ("among", "compared"), [("train", 12 * 11 // 2), ("test", 4 * 3 // 2), ("all", 16 * 15 // 2)]
 )
 def test_which_frames_are_paired(data_set, tmp_path, among, compared):
-    table = synfeal.find_pairs(
-        data_set, tmp_path / "out", among=among, every=2, min_overlap=0.0, grid=(8, 6)
+    table = synfeal.pairs(
+        data_set, tmp_path / "out", among=among, stride=2, min_overlap=0.0, grid=(8, 6)
     )
     assert len(table) == compared
     assert (tmp_path / "out" / "pairs.csv").is_file()
@@ -283,10 +283,10 @@ def test_which_frames_are_paired(data_set, tmp_path, among, compared):
         (["--max-overlap", "nan"], "--max-overlap: must be 0 to 1"),
         (["--min-overlap", "0.5", "--max-overlap", "0.4"], "--min-overlap: must not be above"),
         (["--per-frame", "0"], "--per-frame: must be at least 1"),
-        (["--every", "0"], "--every: must be at least 1"),
+        (["--stride", "0"], "--stride: must be at least 1"),
         (["--tolerance", "0"], "--tolerance: must be above 0"),
         (["--grid", "1", "5"], "--grid: each side"),
-        (["--every", "100", "--among", "test"], "no two frames to compare"),
+        (["--stride", "100", "--among", "test"], "no two frames to compare"),
     ],
 )
 def test_wrong_options_are_named(data_set, tmp_path, capfd, options, message):
@@ -298,7 +298,7 @@ def test_a_set_without_depth_and_a_directory_that_is_not_empty_are_refused(
     data_set, tmp_path, capfd
 ):
     room = save_room(tmp_path / "room.glb")
-    synfeal.collect(room, tmp_path / "set", 2, width=40, height=33, spacing=0.2)
+    synfeal.collect(room, tmp_path / "set", 2, width=40, height=33, spacing_m=0.2)
     assert "collect it with --depth" in refused(capfd, "pairs", tmp_path / "set")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").write_text("mine")
@@ -446,7 +446,7 @@ def test_a_wall_seen_from_half_as_far_in_closed_form(tmp_path):
         tmp_path / "set", [("train", frames_at(*train)), ("test", frames_at(*test))]
     )
     out = tmp_path / "pairs"
-    table = synfeal.find_pairs(folder, out, min_overlap=0.0, grid=(8, 6), flow=True)
+    table = synfeal.pairs(folder, out, min_overlap=0.0, grid=(8, 6), flow=True)
     assert table["split_a"].tolist() == table["split_b"].tolist()
     table = table.set_index("split_a")
     assert sorted(table.index) == ["test", "train"]
@@ -485,7 +485,7 @@ def test_depths_that_differ_by_five_percent_are_alike_as_far_as_is_told(
     frames = [(pose, wall_mm(pose)), (pose, np.full_like(wall_mm(pose), 4200))]
     folder = write_frames_of_wall(tmp_path / "set", [("train", frames)])
     out = tmp_path / "pairs"
-    table = synfeal.find_pairs(folder, out, min_overlap=0.0, tolerance=tolerance, flow=True)
+    table = synfeal.pairs(folder, out, min_overlap=0.0, tolerance=tolerance, flow=True)
     assert table[["overlap_ab", "overlap_ba"]].to_numpy().tolist() == [[overlap_ab] * 2]
     for flow in read_flows(out / table["flow"][0]):
         assert (flow.state == (State.VISIBLE if overlap_ab else State.HIDDEN)).all()
@@ -501,7 +501,7 @@ def test_pixels_without_depth_show_nothing_and_are_not_counted(tmp_path):
         tmp_path / "set", [("train", [(pose, half), (pose, wall_mm(pose))])]
     )
     out = tmp_path / "pairs"
-    table = synfeal.find_pairs(folder, out, grid=(8, 6), flow=True)
+    table = synfeal.pairs(folder, out, grid=(8, 6), flow=True)
     assert table[["overlap_ab", "overlap_ba"]].to_numpy().tolist() == [[1.0, 0.5]]
     forth, back = read_flows(out / table["flow"][0])
     assert (forth.state[:, :32] == State.NO_DEPTH).all()
@@ -515,7 +515,7 @@ def test_every_other_frame_is_that_of_each_sequence_from_its_first(tmp_path):
     places = [before_wall([0, 0, 0.1 * step]) for step in range(6)]
     sequences = [("train", frames_at(*places[:3])), ("train", frames_at(*places[3:]))]
     folder = write_frames_of_wall(tmp_path / "set", sequences)
-    table = synfeal.find_pairs(folder, tmp_path / "pairs", every=2, min_overlap=0.0)
+    table = synfeal.pairs(folder, tmp_path / "pairs", stride=2, min_overlap=0.0)
     images = {*table["image_a"], *table["image_b"]}
     assert images == {name(1, 0), name(1, 2), name(2, 0), name(2, 2)}
     assert len(table) == 4 * 3 // 2
@@ -528,7 +528,7 @@ def test_frames_of_7_scenes_are_compared_by_their_depth_camera(tmp_path, capfd):
     poses = before_wall([0, 0, 0]), before_wall([aside_m, 0, 0])
     frames = [(pose, wall_mm(pose, size)) for pose in poses]
     folder = write_frames_of_wall(tmp_path / "set", [("train", frames)], camera=None)
-    table = synfeal.find_pairs(folder, tmp_path / "pairs", min_overlap=0.0)
+    table = synfeal.pairs(folder, tmp_path / "pairs", min_overlap=0.0)
     assert table[["overlap_ab", "overlap_ba"]].to_numpy().tolist() == [[0.5, 0.5]]
     told = refused(capfd, "pairs", folder, "--out", tmp_path / "flow", "--flow")
     assert "of another camera" in told

@@ -153,8 +153,8 @@ def test_poses_in_the_other_direction(
     for path in copied.glob("*.pose.txt"):
         np.savetxt(path, inverse(np.loadtxt(path)))
     line = refused(copied, tmp_path / "out.glb", capsys)
-    assert "give --poses-are cam_from_world" in line
-    few = ("--poses-are", "cam_from_world", "--frames", "0", "16", "--keep-axes")
+    assert "give --convention cam_from_world" in line
+    few = ("--convention", "cam_from_world", "--range", "0", "16", "--keep-axes")
     assert run_scan(copied, tmp_path / "right.glb", *few) == 0
 
 
@@ -196,7 +196,7 @@ def test_options_that_contradict_or_lack(
     )
     assert "640x480" in capsys.readouterr().err
     assert "a scan is binary glTF" in refused(sequence, tmp_path / "x.obj", capsys)
-    assert "holds no frame" in refused(sequence, tmp_path / "x.glb", capsys, "--frames", "9", "9")
+    assert "holds no frame" in refused(sequence, tmp_path / "x.glb", capsys, "--range", "9", "9")
     assert "--keep-axes" in refused(
         sequence, tmp_path / "x.glb", capsys, "--keep-axes", "--gravity", "0", "0", "-1"
     )
@@ -213,7 +213,7 @@ def test_open3d_is_asked_for(
 
 
 def test_given_gravity_and_kept_axes(sequence: Path, tmp_path: Path) -> None:
-    few = ("--frames", "0", "12")
+    few = ("--range", "0", "12")
     down = [f"{value:.6f}" for value in -SEQUENCE_FROM_ROOM[:3, 2]]
     assert run_scan(sequence, tmp_path / "given.glb", *few, "--gravity", *down) == 0
     given = np.array(record_of(tmp_path / "given.glb")["sequence_from_world"])
@@ -277,7 +277,7 @@ def test_small_pieces_are_dropped() -> None:
 def test_frames_like_the_photographs(sequence: Path, scanned: Path, tmp_path: Path) -> None:
     out = tmp_path / "frames"
     like = ("--like", str(sequence), "--frames", "12", "--width", "160", "--margin", "0.1")
-    assert main(["collect", "--mesh", str(scanned), "--out", str(out), *like]) == 0
+    assert main(["collect", str(scanned), "--out", str(out), *like]) == 0
     manifest = json.loads((out / "manifest.json").read_text())
     color = record_of(scanned)["camera"]["color"]
     assert (manifest["camera"]["width"], manifest["camera"]["height"]) == (160, 120)
@@ -302,7 +302,7 @@ def test_a_mesh_without_colour_is_told(
 ) -> None:
     grey = o3d.geometry.TriangleMesh.create_box()
     o3d.io.write_triangle_mesh(str(tmp_path / "grey.ply"), grey)
-    asked = ["collect", "--mesh", str(tmp_path / "grey.ply"), "--frames", "5"]
+    asked = ["collect", str(tmp_path / "grey.ply"), "--frames", "5"]
     assert main([*asked, "--out", str(tmp_path / "out")]) == 1
     assert "colour" in capsys.readouterr().err
 
@@ -314,7 +314,7 @@ SEQUENCE = os.environ.get("SYNFEAL_TEST_SEQUENCE")
 def test_real_sequence(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     assert SEQUENCE is not None
     out, wrong = tmp_path / "scan.glb", tmp_path / "wrong.glb"
-    asked = ["scan", SEQUENCE, "--frames", "0", "200", "--stride", "4", "--voxel", "0.02"]
+    asked = ["scan", SEQUENCE, "--range", "0", "200", "--stride", "4", "--voxel", "0.02"]
     assert main([*asked, "--preset", "7scenes", "--out", str(out)]) == 0
     assert "focal length" not in caplog.text
     # What its folder says of both cameras is true of the depth camera.

@@ -193,7 +193,7 @@ def bare_room(tmp_path):
 def test_a_mesh_without_colours_is_refused_with_the_way_out_and_collected_with_it(
     bare_room, tmp_path, capfd
 ):
-    command = ["collect", "--mesh", str(bare_room), "--frames", "30", *SMALL, "--depth"]
+    command = ["collect", str(bare_room), "--frames", "30", *SMALL, "--depth"]
     said = refused(capfd, *command, "--out", tmp_path / "plain")
     assert "--shade" in said
     assert "neither a texture nor" in said

@@ -43,10 +43,10 @@ def dataset(tmp_path_factory):
         7,
         test_frames=3,
         depth=True,
-        stereo=BASELINE_M,
+        stereo_m=BASELINE_M,
         width=96,
         height=72,
-        spacing=0.1,
+        spacing_m=0.1,
         box=[(0.8, 4.2, 0.8, 3.2, 1.0, 1.8)],
     )
 
@@ -184,14 +184,14 @@ def test_a_preview_shows_both_images_side_by_side(dataset, tmp_path, capfd):
 
 def test_refusals_are_one_line(tmp_path, capfd):
     mesh = save_room(tmp_path / "room.glb")
-    given = ("collect", "--mesh", mesh, "--frames", 4, "--out", tmp_path / "out", "--stereo")
+    given = ("collect", mesh, "--frames", 4, "--out", tmp_path / "out", "--stereo")
     assert "--stereo" in refused(capfd, *given, 0)
     assert "--stereo" in refused(capfd, *given, "nan")
     effects = tmp_path / "effects.yaml"
     effects.write_text("noise: {}\n")
     assert "effects are of one camera" in refused(capfd, *given, 0.1, "--effects", effects)
     with pytest.raises(InputError, match="stereo"):
-        synfeal.Renderer(synfeal.load_mesh(mesh), stereo=0.1)
+        synfeal.Renderer(synfeal.load_mesh(mesh), stereo_m=0.1)
     assert not (tmp_path / "out").exists()
 
 

@@ -147,7 +147,7 @@ def collected(folder, offset_m, *options):
     parts = [replace(part, vertices_m=part.vertices_m + offset_m) for part in room.parts]
     save_glb(folder / "room.glb", TexturedMesh(tuple(parts)))
     box = [f"{value:.2f}" for value in BOX_M + np.broadcast_to(offset_m, 3).repeat(2)]
-    command = ["collect", "--mesh", str(folder / "room.glb"), "--out", str(folder / "set")]
+    command = ["collect", str(folder / "room.glb"), "--out", str(folder / "set")]
     assert main([*command, "--depth", "--frames", "60", "--box", *box, *options]) == 0
     return folder / "set"
 

@@ -22,7 +22,7 @@ from tests.support.small_room import furnished_room
 
 BOX = (0.8, 4.2, 0.8, 3.2, 1.0, 1.8)
 OPTIONS = {
-    "fisheye": {"projection": "fisheye", "fov": 150.0, "width": 240, "height": 180},
+    "fisheye": {"projection": "fisheye", "fov_deg": 150.0, "width": 240, "height": 180},
     "panorama": {"projection": "equirectangular", "width": 320},
 }
 
@@ -38,7 +38,7 @@ def dataset(request, tmp_path_factory):
         8,
         test_frames=2,
         depth=True,
-        spacing=0.15,
+        spacing_m=0.15,
         box=[BOX],
         **OPTIONS[request.param],
     )
@@ -261,7 +261,7 @@ def test_calibrations_of_fisheye_lenses_are_read(tmp_path):
 def test_careless_cameras_are_refused_in_one_line(options, said, tmp_path, capfd):
     mesh = save_room(tmp_path / "room.glb")
     out = tmp_path / "out"
-    assert said in refused(capfd, "collect", "--mesh", mesh, "--frames", 4, "--out", out, *options)
+    assert said in refused(capfd, "collect", mesh, "--frames", 4, "--out", out, *options)
     assert not out.exists()
 
 

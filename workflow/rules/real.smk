@@ -149,7 +149,7 @@ rule collect:
         more=REAL.collect,
         like=lambda w, input: REAL.sequence if REAL.like == "all" else input.train,
     shell:
-        "synfeal collect --mesh {input.mesh} --like {params.like} --frames {params.frames}"
+        "synfeal collect {input.mesh} --like {params.like} --frames {params.frames}"
         " --width {params.width} --height {params.height} --depth --out {params.out}"
         " {params.more} > {log} 2>&1"
 
