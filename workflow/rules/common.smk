@@ -18,6 +18,7 @@ from reproduction.design.experiments import (
     design_name,
     read_design,
 )
+from reproduction.config.robustness import MIXED
 from reproduction.design.files import SPLITS, Files
 from reproduction.design.jobs import jobs_of_run
 from reproduction.design.label_sets import INJECTED_PATTERN
@@ -30,7 +31,7 @@ from reproduction.design.side_tables import (
     needs_of,
 )
 from reproduction.runs.renamed import refuse_old_names
-from synfeal.config.effects import CLEAN, MIXED
+from synfeal.config.effects import CLEAN
 from synfeal.config.load import read_yaml
 from synfeal.dataset.frame_files import SUFFIX
 from synfeal.effects.files import light_share_files
