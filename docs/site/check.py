@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterable
 from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote, urldefrag, urlsplit
+from urllib.parse import unquote, urlsplit
 
 START = "docs/index.html"
 CLICKS = 2
@@ -49,8 +49,8 @@ def inner_links(name: str, page: Page, site: Path) -> Iterable[tuple[str, str]]:
         parts = urlsplit(link)
         if parts.scheme or parts.netloc:
             continue
-        path, fragment = urldefrag(link)
-        target = ((site / name).parent / unquote(path)).resolve() if path else site / name
+        path, fragment = unquote(parts.path), parts.fragment  # without `?v=…` of style sheets
+        target = ((site / name).parent / path).resolve() if path else site / name
         if target.is_dir():
             target /= "index.html"
         yield target.relative_to(site).as_posix(), unquote(fragment)

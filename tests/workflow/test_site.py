@@ -31,7 +31,7 @@ def write(folder, pages):
 
 
 WHOLE = {
-    "docs/index.html": ["reference/commands.html", "reference/api.html#top", "https://a.org/x"],
+    "docs/index.html": ["reference/commands.html", "reference/api.html?v=1#top", "https://a.org/x"],
     "docs/reference/commands.html": ["commands/collect.html"],
     "docs/reference/commands/collect.html": ["../../index.html"],
     "docs/reference/api.html": ["api/synfeal.collect.html"],
