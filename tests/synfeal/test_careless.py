@@ -54,7 +54,9 @@ def test_a_careless_command_ends_in_one_line_and_nothing_is_lost(name, folder, m
     before, failures = tree(folder), []
     _, option, values = TABLE[name]
     for value in values:
-        names = (*filter(None, [option]), value[:4], folder.name)
+        # What is found on the way has the name of Python: flags are those without the unit.
+        keyword = option.removeprefix("--").replace("-", "_")
+        names = (*filter(None, [option, keyword]), value[:4], folder.name)
         problem = problem_with(arguments_of(name, value), names, capfd)
         if tree(folder) != before:
             problem = f"{problem or ''} something was written or lost"
