@@ -48,7 +48,7 @@ TABLE = (
     ("training: {patience: 3}", "patience: must be left out with `protocol: corrected`"),
     ("datasets: [attic]", "datasets: 'attic' is not one of ['large_room', 'sanctuary']"),
     ("scenes: {attic: {source: mesh}}", "path: a scene with `source: mesh` needs the path"),
-    ("scenes: {attic: {source: procedural}}", "builder: procedural scenes need large_room"),
+    ("scenes: {attic: {source: procedural}}", "builder: a scene with `source: procedural` needs"),
     ("references: {external: {mine: {title: Mine}}}", "give either `poses` or `command`"),
     ("network: {input_px: 96}", "network_camera: both sides must be at least 96 pixels"),
     ("network: {backbone: inception_v3}", "network.input_px: must be at least 75"),
