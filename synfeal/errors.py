@@ -19,7 +19,9 @@ INSIDES = re.compile(
     r"__|magic string|inhomogeneous|broadcast|unpack|not aligned|concatenat|itemsize"
     r"|index-sized|dimension|mmap|unhashable|object (has|is)|set_int_max_str|^[\s\d.+-]*$"
 )
-OBJECT = re.compile(r" ?<[^<>]* at 0x[0-9a-f]+>|, line \d+, column \d+: .*| in \"<[a-z ]+>\"")
+OBJECT = re.compile(
+    r" ?<[^<>]* at 0x[0-9a-f]+>| ?<_io\.[^<>]*>|, line \d+, column \d+: .*| in \"<[a-z ]+>\""
+)
 TOKEN = re.compile(r"<([a-z ]+)>")  # of YAML
 NO_NUMBER = re.compile(r"(could not convert string to float|invalid literal for int\(\).*?): (.*)")
 UNFIT = "its parts do not fit together"

@@ -258,7 +258,7 @@ def test_a_sequence_that_cannot_be_used_is_told_in_one_line(
     [
         (["--images", 0], "--images: must be 1 to 1,000,000,000, found 0"),
         (["--minutes", 0], "--minutes: must be above 0 and below 1e6, found 0"),
-        (["--minutes", 1, "--images", 9], "--minutes: --images says how long already"),
+        (["--minutes", 1, "--images", 9], "--minutes: images say how long already"),
         (["--held-out", 1], "--held-out: must be a share"),
         (["--range", 5, 5], "--range: 5 5 holds no frame"),
         (["--range", 100, 200], "none of them in the range"),

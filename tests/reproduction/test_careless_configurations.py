@@ -55,7 +55,10 @@ TABLE = (
     ("pretraining: {source: rooms}", "pretraining.source: "),
     ("pretraining: {source: imagenet}", "network.width: must be 1"),
     ("network_camera: {near_m: 200}", "network_camera.near_m: must be below far_m"),
-    ("localizers: {posenet: {lr: 1}}", "localizers.posenet.lr: unknown key; allowed here: beta"),
+    (
+        "localizers: {posenet: {lr: 1}}",
+        "localizers.posenet.lr: unknown key; allowed here: auxiliary, beta",
+    ),
     # effects
     ("render: {effects: {motion_blur: {exposure_s: 0.7}}}", "0.7 s is longer than the 0.5 s"),
     ("render: {effects: {light: {ev: [1, -1]}}}", "light.ev: the first number"),

@@ -227,7 +227,8 @@ def problem_with(read, is_valid, names, folder=None):
 # What only a programmer says: classes, addresses, codecs, an empty reason, a name said twice.
 JARGON = re.compile(
     r"<\w+[. ]| at 0x[0-9a-f]{4}|[A-Z]\w+Error\b|Errno|NoneType|codec|object (has|is)\b"
-    r"|convert string|invalid literal|inhomogeneous|indices|unhashable|operand|instance of|\(\)|: :"
+    r"|convert string|invalid literal|inhomogeneous|(?<!vertex_)indices|unhashable|operand"
+    r"|instance of|\(\)|: :"
     r"|\b(\w+): \1: "
 )
 
