@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import synfeal
-from synfeal.camera.projection import rays_of_pixels
+from synfeal.camera.projection import pixels_per_radian, rays_of_pixels
 from synfeal.cli import main
 from synfeal.config.dataset import CameraConfig
 from synfeal.exporting.run import export
@@ -210,7 +210,7 @@ def test_colmap_reconstructs_the_exact_poses(dataset, tmp_path):
     # Relative rotations: those of the whole are poorly known from centres on a line.
     turned = [np.swapaxes(p[:1, :, :3], 1, 2) @ p[1:, :, :3] for p in (a, b)]
     angle_rad = rotation_angle_rad(*map(quat_wxyz_from_matrix, turned))
-    assert np.degrees(np.median(angle_rad)) < 0.05
+    assert np.median(angle_rad) * min(pixels_per_radian(dataset.camera)) < 0.1  # of a pixel
 
 
 def test_colmap_projects_as_we_do(dataset, tmp_path):
