@@ -150,7 +150,9 @@ def complete_results(root):
     fill_assistance(root)
     for name in ROWS:
         make(name, design, root)
-    write_side_table("table1_meshes", design_of(design), {}, root, *table_files(root, "table1_meshes"))
+    write_side_table(
+        "table1_meshes", design_of(design), {}, root, *table_files(root, "table1_meshes")
+    )
     return root
 
 
