@@ -46,7 +46,8 @@ def refuse_colorless(mesh: TexturedMesh, name: str) -> None:
     if not painted and len({part.base_color.tobytes() for part in mesh.parts}) == 1:
         raise InputError(
             f"{name}: has neither a texture nor vertex colours; images would be of one colour."
-            " Export it with its texture, or give the shade headlight, which shows its shape"
+            " Export it with its texture (an OBJ with its .mtl), or show its shape by the light of"
+            " a lamp at the camera: --shade headlight"
         )
 
 
