@@ -234,7 +234,8 @@ def test_the_page_and_the_summary_leave_out_the_table_without_rows(
     monkeypatch.setattr(page, "room_html", lambda scene, *_: f"<p>{scene} in 3D</p>")
     design = design_of(row for row in large_room_design() if row.table != table)
     of_labels = {"assistance", "label_error"} if table != "table2_ground_truth" else set()
-    made = [name for name in SIDE_TABLES if name in {"references", "recall"} | of_labels]
+    kept = {"table1_meshes", "references", "recall"} | of_labels
+    made = [name for name in SIDE_TABLES if name in kept]
     page.write_report(design, finished, tmp_path / "report.html", made)
     html = (tmp_path / "report.html").read_text()
     shown = {
