@@ -75,7 +75,8 @@ def _without_viewer() -> Iterator[None]:
 # (https://pyrender.readthedocs.io/en/latest/examples/offscreen.html).
 os.environ["PYOPENGL_PLATFORM"] = "egl"
 try:
-    import pyrender
+    with _without_viewer():
+        import pyrender
     from OpenGL import GL
     from pyrender.constants import GLTF
     from pyrender.platforms import egl
