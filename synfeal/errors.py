@@ -9,6 +9,8 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -27,34 +29,61 @@ NO_NUMBER = re.compile(r"(could not convert string to float|invalid literal for 
 UNFIT = "its parts do not fit together"
 
 
+@dataclass(frozen=True)
+class Argument:
+    """Argument of a function, where that is what an error is about.
+
+    Attributes:
+        name: Its name in Python, such as ``spacing_m``; the command line shows its flag instead.
+    """
+
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
 class InputError(Exception):
     """Input from a user that cannot be used.
 
-    The message is one line that names the file and the field and says what to do. Entry points
-    print it without a traceback and exit with status 1; every other exception is a defect and keeps
-    its traceback.
+    As text it is one line, ``where: problem; remedy``. Entry points print it without a traceback
+    and exit with status 1; every other exception is a defect and keeps its traceback.
+
+    Problem and remedy name arguments as Python has them, between backticks and with a value where
+    that helps: "give `unit_m`", "give `depth_scale=5000`". The command line writes them as flags
+    (:mod:`synfeal.cli.wording`), so a function answers its caller in the words of the call.
+
+    Attributes:
+        where: File, with its line or field if there is one, or argument that is wrong; a message
+            that is of neither may stand here alone.
+        problem: What is wrong there.
+        remedy: What to do about it, in the imperative.
     """
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, where: Argument | Path | str, problem: str = "", remedy: str = "") -> None:
+        super().__init__(where, problem, remedy)
+        self.where, self.problem, self.remedy = where, problem, remedy
+
+    def __str__(self) -> str:
+        answer = "; ".join(filter(None, (self.problem, self.remedy)))
+        message = f"{self.where}: {answer}" if answer else str(self.where)
         line = "".join(c if c.isprintable() else "?" for c in " ".join(message.split()))
         if len(line) > LONGEST:  # what a file holds is quoted in part; the remedy stands at the end
             line = f"{line[: LONGEST - 200]} ... {line[-190:]}"
-        super().__init__(line)
+        return line
 
 
 class SettingError(InputError):
-    """A setting that cannot be used, by the name it has in Python.
-
-    The command line puts the option made of that name in its place.
+    """An argument that cannot be used.
 
     Attributes:
-        field: Name of the setting, such as ``spacing_m``.
-        problem: What is wrong with it, and what to do.
+        where: The argument.
     """
 
+    where: Argument
+
     def __init__(self, field: str, problem: str) -> None:
-        super().__init__(f"{field}: {problem}")
-        self.field, self.problem = field, problem
+        super().__init__(Argument(field), problem)
 
 
 def exit_status(action: Callable[[], object], if_interrupted: str) -> int:

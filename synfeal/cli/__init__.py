@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from synfeal import __version__
 from synfeal.cli import capturing, datasets, meshes
 from synfeal.cli.options import Command, in_words_of_today, numbers_apart
+from synfeal.cli.wording import Formatter, Wording
 from synfeal.errors import exit_status
 
 
@@ -74,11 +75,19 @@ def build_parser(commands: Sequence[Command]) -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; return 0, 1 for what a person can fix, 2 for wrong usage, 130 after Ctrl-C."""
-    logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     commands = all_commands()
+    handler, formatter = logging.StreamHandler(), Formatter(Wording(None, commands))
+    handler.setFormatter(formatter)
+    logging.basicConfig(handlers=[handler], level=logging.WARNING)
     every = tuple(option for command in commands for option in command.options)
     given = in_words_of_today(sys.argv[1:] if argv is None else argv, commands)
     arguments, unknown = build_parser(commands).parse_known_args(list(numbers_apart(given, every)))
     if unknown:  # the command's own parser reports it, with its usage
         arguments.usage.error(f"unrecognized arguments: {' '.join(unknown)}")
-    return exit_status(lambda: arguments.action(arguments), "nothing was kept")
+    wording = formatter.wording = arguments.wording = Wording(arguments.action, commands)
+
+    def act() -> None:
+        with wording.of_errors():
+            arguments.action(arguments)
+
+    return exit_status(act, "nothing was kept")

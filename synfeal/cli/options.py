@@ -14,7 +14,6 @@ from pydantic.fields import FieldInfo
 
 from synfeal.config.collect import Shown
 from synfeal.config.flags import UNITS, flag_of
-from synfeal.errors import InputError, SettingError
 
 log = logging.getLogger("synfeal")
 
@@ -51,19 +50,18 @@ class Command(NamedTuple):
     rewriting: Rewriting | None = None
 
     def __call__(self, arguments: argparse.Namespace) -> None:
-        """Carry it out, saying of options what its function says of settings."""
-        try:
-            self.action(arguments)
-        except SettingError as error:
-            raise InputError(f"{self.shown(error.field)}: {error.problem}") from error
+        """Carry it out."""
+        self.action(arguments)
 
-    def shown(self, name: str) -> str:
-        """Return how a setting is written on the command line: its flag, or its place."""
-        for flag, details in self.options:
-            if destination(flag, details) == name:
-                metavar = details.get("metavar", flag.upper())
-                return flag if flag.startswith("-") else str(metavar)
-        return name
+    @property
+    def flags(self) -> dict[str, str]:
+        """Flags of its options by their names in Python; of one without a flag, its place."""
+        return {
+            destination(flag, details): flag
+            if flag.startswith("-")
+            else str(details.get("metavar", flag.upper()))
+            for flag, details in self.options
+        }
 
 
 def option(flag: str, text: str, **details: Any) -> Option:

@@ -412,7 +412,7 @@ def checked(model: type[Model], values: Mapping[str, Any]) -> Model:
     except ValidationError as error:
         where, _, problem = describe(error).partition(": ")
         field, _, below = where.partition(".")
-        raise SettingError(field, f"{below}: {problem}" if below else problem) from error
+        raise SettingError(field, ": ".join(filter(None, (below, problem)))) from error
 
 
 def _part(model: type[Model], values: Mapping[str, Any], names: Mapping[str, str] = KEYS) -> Model:
