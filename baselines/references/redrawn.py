@@ -25,7 +25,7 @@ from baselines.references.photographs import MAX_ERROR_PX, Answer, Photograph
 from baselines.references.structure import pinhole, supported_pose
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import RenderConfig
-from synfeal.dataset.world import read_scan_record, rigid_motion_of
+from synfeal.dataset.world import read_scan_record
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.load import load_mesh
@@ -200,5 +200,4 @@ def _mesh_from_map(place: StructureMap, file: Path) -> Array:
     record = read_scan_record(file)
     if record is None or place.sequence_from_world is None:
         return np.eye(4)
-    sequence_from_mesh = rigid_motion_of(record, file.with_suffix(".json"))
-    return np.asarray(inverse(sequence_from_mesh) @ place.sequence_from_world)
+    return np.asarray(inverse(record.sequence_from_world) @ place.sequence_from_world)

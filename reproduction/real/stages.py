@@ -250,4 +250,4 @@ def scan_camera(scan: Path, width: int | None) -> CameraConfig:
 def _in_scan(scan: Path, photographs: PosedFrames) -> Array:
     record = read_scan_record(scan)
     assert record is not None, f"{scan}: not of synfeal scan"
-    return inverse(rigid_motion_of(record, scan.with_suffix(".json"))) @ photographs.world_from_cam
+    return inverse(record.sequence_from_world) @ photographs.world_from_cam

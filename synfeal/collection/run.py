@@ -32,7 +32,7 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_ta
 from synfeal.dataset.render_pool import Studio, render_sequences
 from synfeal.dataset.render_sequence import resolved
 from synfeal.dataset.sevenscenes import Split, sequences_of
-from synfeal.dataset.world import read_scan_record, rigid_motion_of, write_sequence_from_world
+from synfeal.dataset.world import read_scan_record, write_sequence_from_world
 from synfeal.effects.scene import crowd_of
 from synfeal.errors import InputError, SettingError
 from synfeal.geometry.poses import moved_right
@@ -209,11 +209,11 @@ class CollectJob:
             return None
         if self.config.unit_m != 1.0 or not is_y_up(mesh, self.config.up_axis):
             log.warning(
-                "%s: is not used, unit or up axis move the mesh away from what it says",
-                mesh.with_suffix(".json"),
+                "%s: the world of the scan is not used, unit or up axis move the mesh away from it",
+                record.source,
             )
             return None
-        return rigid_motion_of(record, mesh.with_suffix(".json"))
+        return record.sequence_from_world
 
 
 def collect(config: CollectConfig, out: Path, cores: int = 1) -> None:

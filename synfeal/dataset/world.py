@@ -5,11 +5,15 @@ of a data set holds the rigid motion between the two, so that poses found in the
 with poses known in the other::
 
     {"sequence_from_world": [[...], [...], [...], [0, 0, 0, 1]]}
+
+The data set takes it from the scan, which holds it in its own file and in ``scan.json``.
 """
 
 from __future__ import annotations
 
+import logging
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +22,15 @@ from numpy.typing import NDArray
 
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.rigid import is_rigid
-from synfeal.records.files import read_json, write_json
+from synfeal.mesh.gltf import glb_extras
+from synfeal.records.files import file_sha256, read_json, write_json
 
 WORLD = "world.json"
 KEY = "sequence_from_world"
+SCAN = "synfeal_scan"  # among the extras of a scan's glTF
+MESH_SHA256 = "mesh_sha256"
+
+log = logging.getLogger("synfeal")
 
 
 def read_sequence_from_world(folder: Path) -> NDArray[np.float64] | None:
@@ -76,11 +85,36 @@ def write_sequence_from_world(folder: Path, sequence_from_world: NDArray[np.floa
     write_json(folder / WORLD, {KEY: np.asarray(sequence_from_world, np.float64).tolist()})
 
 
-def read_scan_record(mesh: Path) -> dict[str, Any] | None:
-    """Read what ``synfeal scan`` wrote beside a mesh.
+@dataclass(frozen=True)
+class ScanRecord:
+    """What ``synfeal scan`` noted of a mesh.
+
+    Attributes:
+        source: File that the record stands in, for messages.
+        values: The record, as ``scan.json`` has it.
+    """
+
+    source: Path
+    values: dict[str, Any]
+
+    @property
+    def sequence_from_world(self) -> NDArray[np.float64]:
+        """Rigid motion (4, 4) from the world of the mesh to that of the sequence.
+
+        Raises:
+            InputError: It is no rigid motion.
+        """
+        return rigid_motion_of(self.values, self.source)
+
+
+def read_scan_record(mesh: Path) -> ScanRecord | None:
+    """Read what ``synfeal scan`` noted of a mesh, whatever the mesh is called now.
+
+    The record stands in the mesh itself. Scans of earlier versions, and those that another program
+    has saved anew, have it in ``scan.json`` beside ``scan.glb`` alone.
 
     Args:
-        mesh: ``scan.glb``; the record is ``scan.json``.
+        mesh: ``scan.glb``, renamed, copied, or a link to it.
 
     Returns:
         The record, with a rigid ``sequence_from_world``; None where the mesh is from elsewhere.
@@ -88,12 +122,36 @@ def read_scan_record(mesh: Path) -> dict[str, Any] | None:
     Raises:
         InputError: The record's ``sequence_from_world`` is no rigid motion.
     """
-    path = mesh.with_suffix(".json")
-    try:
-        record = read_json(path)
-    except (OSError, ValueError):
-        return None  # none, or a file of somebody else's
-    if not isinstance(record, dict) or KEY not in record:
-        return None
-    rigid_motion_of(record, path)
-    return record
+    inside = glb_extras(mesh).get(SCAN)
+    is_inside = isinstance(inside, dict) and KEY in inside
+    found = ScanRecord(mesh, inside or {}) if is_inside else _record_beside(mesh)
+    if found is not None:
+        _ = found.sequence_from_world  # refused here, not where it is used
+    return found
+
+
+def _record_beside(mesh: Path) -> ScanRecord | None:
+    """Read the JSON file of the same name as a mesh, or as the mesh that a link leads to."""
+    for path in dict.fromkeys((mesh, Path(os.path.realpath(mesh)))):
+        beside = path.with_suffix(".json")
+        try:
+            values = read_json(beside)
+        except (OSError, ValueError):
+            continue  # none, or a file of somebody else's
+        if isinstance(values, dict) and KEY in values:
+            _warn_of_another(mesh, beside, values)
+            return ScanRecord(beside, values)
+    return None
+
+
+def _warn_of_another(mesh: Path, beside: Path, values: dict[str, Any]) -> None:
+    """Say where a mesh is not the one that the record beside it was written with."""
+    written = values.get(MESH_SHA256)
+    if written is None or not mesh.is_file() or written == file_sha256(mesh):
+        return
+    log.warning(
+        "%s: is not the mesh that %s was written with; its world is taken to be that one, which is"
+        " right of a scan that was only edited; delete the .json if it is of another scan",
+        mesh,
+        beside.name,
+    )

@@ -70,6 +70,28 @@ def read_gltf(path: Path) -> Gltf:
     return Gltf(_parse_json(path, chunks[JSON_CHUNK]), chunks.get(BIN_CHUNK, b""))
 
 
+def glb_extras(path: Path) -> Json:
+    """Read what a program has noted in a GLB of its own; nothing is read of the geometry.
+
+    Returns:
+        ``extras`` of the file's ``asset``; empty where it has none, or is no GLB.
+    """
+    if path.suffix.lower() != ".glb" or not path.is_file():
+        return {}
+    with path.open("rb") as file:
+        begin = file.read(20)  # magic, version, size, then length and kind of the first chunk
+        if len(begin) < 20 or begin[:4] != GLB_MAGIC or begin[16:] != JSON_CHUNK:
+            return {}
+        (length,) = struct.unpack_from("<I", begin, 12)
+        text = file.read(length)
+    try:
+        asset = json.loads(text)["asset"]
+    except (ValueError, TypeError, KeyError, RecursionError):
+        return {}  # whoever reads the mesh says so
+    extras = asset.get("extras") if isinstance(asset, dict) else None
+    return extras if isinstance(extras, dict) else {}
+
+
 def _parse_json(path: Path, text: bytes) -> Json:
     try:
         header = json.loads(text)

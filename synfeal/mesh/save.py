@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,11 +35,17 @@ def _png(pixels: NDArray[np.uint8]) -> Image.Image:
     return image
 
 
-def save_glb(path: Path, mesh: TexturedMesh) -> None:
+def save_glb(path: Path, mesh: TexturedMesh, extras: Mapping[str, Any] | None = None) -> None:
     """Write ``mesh`` as binary glTF: y-up, metres, textures inside as PNG (lossless).
 
     ``load_mesh(path)`` gives the same parts back, with colours exact and coordinates to about
     1e-7 of the mesh's extents; saving those again changes nothing.
+
+    Args:
+        path: File to write.
+        mesh: The mesh.
+        extras: Further values to keep in the file, ready for JSON; see
+            :func:`synfeal.mesh.gltf.glb_extras`.
 
     Raises:
         InputError: ``path`` does not end in ``.glb``.
@@ -57,8 +64,14 @@ def save_glb(path: Path, mesh: TexturedMesh) -> None:
             geom_name=f"{index:04d}:{part.name}",
             transform=trimesh.transformations.translation_matrix(WORLD_FROM_Y_UP.T @ origin_m),
         )
+
+    def complete(tree: dict[str, Any]) -> None:
+        materials.complete(tree)
+        if extras:
+            tree["asset"]["extras"] = dict(extras)
+
     with atomic_path(path) as temporary:
-        exported = scene.export(file_type="glb", tree_postprocessor=materials.complete)
+        exported = scene.export(file_type="glb", tree_postprocessor=complete)
         temporary.write_bytes(exported)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import read_posed_sequence
-from synfeal.dataset.world import read_scan_record, rigid_motion_of
+from synfeal.dataset.world import ScanRecord, read_scan_record
 from synfeal.errors import InputError, SettingError, read_as
 from synfeal.geometry.axes import meant_poses
 from synfeal.geometry.poses import inverse
@@ -64,8 +63,8 @@ def like_trajectory(
     """Take bounds and camera from the trajectory of a sequence.
 
     Args:
-        mesh: The mesh that frames are collected of; where ``synfeal scan`` made it, the record
-            beside it says how its world lies in that of the sequence, and what the camera is.
+        mesh: The mesh that frames are collected of; where ``synfeal scan`` made it, its
+            record says how its world lies in that of the sequence, and what the camera is.
         sequence: Posed photographs.
         frames: Which of them; None for all.
         margin_m: Added to the box on all sides, metres.
@@ -77,8 +76,8 @@ def like_trajectory(
     poses = read_posed_sequence(sequence, frames).world_from_cam
     record = read_scan_record(mesh)
     if record is not None:
-        poses = meant_poses(poses, record.get("poses_are", "world_from_cam"))
-        poses = inverse(rigid_motion_of(record, mesh.with_suffix(".json"))) @ poses
+        poses = meant_poses(poses, record.values.get("poses_are", "world_from_cam"))
+        poses = inverse(record.sequence_from_world) @ poses
     low, high = poses[:, :3, 3].min(axis=0) - margin_m, poses[:, :3, 3].max(axis=0) + margin_m
     roll_deg, pitch_deg, yaw_deg = np.rad2deg(rpy_of(poses[:, :3, :3])).T
     return Like(
@@ -89,7 +88,7 @@ def like_trajectory(
             float(min(pitch_deg.max() + margin_deg, STEEPEST_DEG)),
         ),
         yaw_deg=_arc(yaw_deg, margin_deg),
-        camera=_camera(mesh, sequence, record),
+        camera=_camera(sequence, record),
         n_frames=len(poses),
     )
 
@@ -122,10 +121,10 @@ def _arc(angle_deg: Array, margin_deg: float) -> tuple[float, float]:
     return (low, low + max(float(length) + 2.0 * margin_deg, 0.1))
 
 
-def _camera(mesh: Path, sequence: Path, record: dict[str, Any] | None) -> CameraConfig | None:
+def _camera(sequence: Path, record: ScanRecord | None) -> CameraConfig | None:
     """Return the camera of the photographs from a scan's record or a data set's manifest."""
     if record is not None:
-        path, values = mesh.with_suffix(".json"), record.get("camera", {}).get("color")
+        path, values = record.source, record.values.get("camera", {}).get("color")
     elif (sequence / MANIFEST).is_file():
         path = sequence / MANIFEST
         with read_as(path, "a manifest"):

@@ -17,12 +17,13 @@ from synfeal.captures.unpack import known_up
 from synfeal.dataset.depth_agreement import DepthAgreement, best_focal_px, check_depth, spread
 from synfeal.dataset.images import image_size
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
+from synfeal.dataset.world import MESH_SHA256, SCAN
 from synfeal.errors import InputError
 from synfeal.geometry.axes import PosesAre, meant_poses
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
-from synfeal.records.files import write_json
+from synfeal.records.files import file_sha256, write_json
 from synfeal.records.progress import Progress
 from synfeal.scanning.camera import (
     CameraOptions,
@@ -165,8 +166,9 @@ def scan(job: ScanJob) -> Scan:
         f" {record['photographs']['covered']:.0%} of them covered"
     )
     write_picture(compared, title, job.out.with_suffix(".png"))
+    save_glb(job.out, mesh, {SCAN: record})
+    record[MESH_SHA256] = file_sha256(job.out)
     write_json(job.out.with_suffix(".json"), record)
-    save_glb(job.out, mesh)
     return Scan(mesh, record, tuple(compared))
 
 

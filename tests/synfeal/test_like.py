@@ -7,18 +7,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from numpy.typing import NDArray
 
 from synfeal.cli import main
 from synfeal.config.collect import LikeConfig, checked
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.world import read_scan_record
+from synfeal.dataset.world import MESH_SHA256, SCAN, read_scan_record
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.rays import RayCaster
+from synfeal.mesh.save import save_glb
 from synfeal.planning.like import like_trajectory, resized, rpy_of
 from synfeal.planning.space import seen_shares
+from synfeal.records.files import file_sha256, write_json
+from tests.support.collected import painted
 
 Array = NDArray[np.float64]
 
@@ -97,6 +101,37 @@ def test_records_of_others_are_passed_over(tmp_path: Path) -> None:
     (tmp_path / "scan.json").write_text('{"sequence_from_world": [[1, 0], [0, 1]]}')
     with pytest.raises(InputError, match=r"scan\.json: sequence_from_world"):
         read_scan_record(tmp_path / "scan.glb")
+
+
+@pytest.mark.parametrize("name", ["kitchen.glb", "elsewhere/kitchen.glb", "linked.glb"])
+def test_a_scan_keeps_its_world_under_another_name(tmp_path: Path, name: str) -> None:
+    sequence_from_world = poses_at(np.array([40.0, -30.0, 70.0]), np.array([3.0, 2.0, 1.0]))
+    record = {"sequence_from_world": sequence_from_world.tolist()}
+    scan, other = tmp_path / "scan.glb", tmp_path / name
+    save_glb(scan, painted(trimesh.creation.box()), {SCAN: record})
+    # A record of another scan that had the new name before says nothing of this one.
+    other.parent.mkdir(exist_ok=True)
+    other.with_suffix(".json").write_text('{"sequence_from_world": [[1, 0], [0, 1]]}')
+    other.symlink_to(scan) if name == "linked.glb" else scan.rename(other)
+    found = read_scan_record(other)
+    assert found is not None
+    np.testing.assert_array_equal(found.sequence_from_world, sequence_from_world)
+
+
+def test_a_record_beside_another_mesh_is_used_with_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    record = {"sequence_from_world": np.eye(4).tolist()}
+    scan, linked = tmp_path / "scan.glb", tmp_path / "linked.glb"
+    save_glb(scan, painted(trimesh.creation.box()))
+    linked.symlink_to(scan)
+    write_json(tmp_path / "scan.json", {**record, MESH_SHA256: file_sha256(scan)})
+    assert read_scan_record(scan) is not None
+    assert read_scan_record(linked) is not None
+    assert not caplog.records
+    save_glb(scan, painted(trimesh.creation.box((2.0, 1.0, 1.0))))
+    assert read_scan_record(scan) is not None
+    assert "is not the mesh that scan.json was written with" in caplog.text
 
 
 def test_sides_that_do_not_fit_and_negative_margins(tmp_path: Path) -> None:
