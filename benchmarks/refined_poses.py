@@ -98,8 +98,8 @@ def measure(place: Place, chosen: Sequence[int]) -> Array:
         for row, index in enumerate(chosen):
             began = time.process_time()
             path = Path(str(frames.color[index]))
-            image = open_picture(path)
-            calibration = camera.of(image, path)
+            image, turn = open_picture(path)
+            calibration = camera.of(image, path, turn)
             assert calibration is not None
             photograph = finder.look_at(image, calibration)
             answer = finder.find(photograph)

@@ -7,6 +7,7 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from baselines.cli.training import TURNED_TEXT
 from synfeal.cli.meshes import RGBD_OPTIONS
 from synfeal.cli.options import command, keywords, option
 
@@ -106,4 +107,5 @@ def found_text(done: LocalizedInMap) -> str:
     where = world[done.world] if done.world else ""
     counted = f"{done.n_found} of {done.n_images} photographs localized{where}, {lost} not"
     support = f" by {done.inliers:.0f} inliers (median)" if done.n_found else ""
-    return f"{counted}{support}; {done.seconds:.2f} s a photograph (median)"
+    turned = f"; {TURNED_TEXT.format(done.n_turned)}" if done.n_turned else ""
+    return f"{counted}{support}{turned}; {done.seconds:.2f} s a photograph (median)"

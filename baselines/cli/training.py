@@ -206,6 +206,8 @@ def model_text(done: Localized) -> str:
     return f"{description.localizer}, pictures shrunk to {px} x {px} pixels; {view}{lens}"
 
 
+# Of photographs and the file of --camera, which is of the sensor.
+TURNED_TEXT = "{} of them stand upright by their EXIF, the calibration was turned with them"
 SOURCES = {
     "file": "their calibration",
     "focal": "their focal length",
@@ -218,6 +220,8 @@ def resampled_text(done: Localized) -> str:
     which = "all" if done.n_resampled == done.n_images else f"{done.n_resampled} of {done.n_images}"
     by = SOURCES[done.calibration] if done.calibration else ""
     text = f"{which} pictures were brought to that view by {by}"
+    if done.n_turned:
+        text += f"; {TURNED_TEXT.format(done.n_turned)}"
     if done.outside < 5e-4:
         return text
     return (

@@ -47,6 +47,7 @@ class LocalizedInMap(NamedTuple):
         n_images: Photographs.
         n_found: Those that were localized.
         n_ambiguous: Those of which several places look alike, which have no pose.
+        n_turned: Those that EXIF turns, and their calibration with them.
         inliers: Median number of features that agree with the pose, of those localized; NaN where
             none was.
         focal_ratio: Median over those localized of the focal length that fits best over the one
@@ -60,6 +61,7 @@ class LocalizedInMap(NamedTuple):
     n_images: int
     n_found: int
     n_ambiguous: int
+    n_turned: int
     inliers: float
     focal_ratio: float
     world: World | None
@@ -106,11 +108,12 @@ def localize_in_map(
     _check_out(out, pictures)
     torch.set_num_threads(1)
     taken_s: list[float] = []
+    turned: list[Path] = []
     with ExitStack() as opened:
         redrawn = None
         if refine is not None:
             redrawn = opened.enter_context(read_redrawn(place, refine, folder, seed))
-        find = partial(_find, Finder(place, seed), redrawn, least_confidence, camera)
+        find = partial(_find, Finder(place, seed), redrawn, least_confidence, camera, turned)
         answers = _find_all(find, pictures, taken_s)
     poses = np.array([answer.world_from_cam for answer in answers])
     sure = np.array([a.support.confidence >= least_confidence for a in answers])
@@ -128,6 +131,7 @@ def localize_in_map(
         n_images=len(pictures),
         n_found=int(found.sum()),
         n_ambiguous=int(ambiguous.sum()),
+        n_turned=len(turned),
         inliers=float(median(counts)) if counts else float("nan"),
         focal_ratio=float(np.median(ratios)) if len(ratios) >= FEWEST_RATIOS else float("nan"),
         world=None if place.sequence_from_world is None else world,
@@ -159,15 +163,19 @@ def _find(
     redrawn: Redrawn | None,
     least_confidence: float,
     camera: PhotographCamera,
+    turned: list[Path],
     path: Path,
 ) -> Answer:
-    image = open_picture(path)
-    calibration = camera.of(image, path)
+    """Answer one photograph; note it in ``turned`` if its calibration was turned with it."""
+    image, turn = open_picture(path)
+    calibration = camera.of(image, path, turn)
     if calibration is None:
         raise InputError(
             f"{path}: nothing says what its focal length is, which its pose depends on; give the"
             " camera's calibration with --camera, or its focal length in pixels with --focal"
         )
+    if camera.turns_with(image, turn):
+        turned.append(path)
     photograph = finder.look_at(image, calibration)
     answer = finder.find(photograph)
     refused = answer.support.confidence < least_confidence or answer.is_ambiguous

@@ -24,8 +24,9 @@ from baselines.training.resample import Resampler, same_view
 from baselines.training.typicality import OUTSIDE, features_of, typicality
 from baselines.training.virtual_views import VirtualViews
 from synfeal.camera.calibration import Calibration
+from synfeal.camera.orientation import Orientation, Upright, upright
 from synfeal.camera.photograph import PhotographCamera, Source
-from synfeal.dataset.images import read_image, upright
+from synfeal.dataset.images import HEIF, HEIF_REMEDY, HEIF_SUFFIXES, read_image, reads_heif
 from synfeal.dataset.packed import NetworkView, fit_frame
 from synfeal.dataset.pose_table import COLUMNS, SEEN
 from synfeal.errors import InputError
@@ -61,6 +62,7 @@ class Localized(NamedTuple):
         n_beyond: Those whose pose lies far outside of the training positions.
         n_unlike: Those that are unlike the training frames; None where the model cannot tell.
         n_resampled: Those that were brought to the training camera.
+        n_turned: Those of these that EXIF turns, and their calibration with them.
         calibration: Source of the camera of these.
         outside: Largest share of the training view that one of these does not show.
         world: Whose coordinates poses are in, where the two differ.
@@ -77,6 +79,7 @@ class Localized(NamedTuple):
     n_beyond: int
     n_unlike: int | None
     n_resampled: int
+    n_turned: int
     calibration: Source | None
     outside: float
     world: World | None
@@ -142,6 +145,7 @@ def localize(
         n_beyond=int(seen.beyond.sum()),
         n_unlike=None if trained.calibration is None else int(seen.unlike.sum()),
         n_resampled=len(reader.resampled),
+        n_turned=len(reader.turned),
         calibration=reader.source if reader.resampled else None,
         outside=reader.outside,
         world=None if moved is None else world,
@@ -290,7 +294,8 @@ def _write(
         write_frame(out, frame, float_format=None, na_rep="nan")
 
 
-SUFFIXES = (".png", ".jpg", ".jpeg")
+SUFFIXES = (".png", ".jpg", ".jpeg", *HEIF_SUFFIXES)
+FORMATS = ("PNG", "JPEG", HEIF)
 # Modes of eight bits or fewer per channel; what else there is has no scale that is known.
 LEAVE_OUT = "; leave it out or repair it"
 # A longer picture has no square with as much to see as a training frame has.
@@ -327,10 +332,10 @@ def read_picture(path: Path, input_px: int, view: NetworkView = "square") -> NDA
     Raises:
         InputError: As :func:`open_picture`.
     """
-    return fit_frame(open_picture(path), input_px, view)
+    return fit_frame(open_picture(path).image, input_px, view)
 
 
-def open_picture(path: Path) -> Image.Image:
+def open_picture(path: Path) -> Upright:
     """Read a picture as RGB, turned upright by its EXIF orientation.
 
     Rendered frames have none, so the packer does not look. Grey, palette and CMYK become RGB; an
@@ -339,9 +344,7 @@ def open_picture(path: Path) -> Image.Image:
     Raises:
         InputError: The file is damaged, or is no picture of eight bits per channel.
     """
-    image = read_image(
-        path, "RGB", formats=("PNG", "JPEG"), most_pixels=MOST_PIXELS, remedy=LEAVE_OUT
-    )
+    image = read_image(path, "RGB", formats=FORMATS, most_pixels=MOST_PIXELS, remedy=LEAVE_OUT)
     if max(image.size) > MAX_ASPECT * min(image.size):
         raise InputError(
             f"{path}: is {image.width} x {image.height} pixels, too long for a square to be cut"
@@ -361,6 +364,7 @@ class PictureReader:
     Attributes:
         read_s: Seconds that each picture took.
         resampled: Pictures that were brought to the training camera.
+        turned: Those of them that EXIF turns, and their calibration with them.
         outside: Largest share of the training view that one of these does not show.
         source: Source of the camera of pictures; None where there is none.
 
@@ -383,22 +387,25 @@ class PictureReader:
         self._resamplers: dict[Calibration, Resampler | None] = {}
         self.read_s: list[float] = []
         self.resampled: set[Path] = set()
+        self.turned: set[Path] = set()
         self.outside = 0.0
 
     def __call__(self, path: Path) -> NDArray[np.uint8]:
         """Read a picture as pixels (input_px, input_px, 3)."""
         began = time.perf_counter()
-        image = self._brought(open_picture(path), path)
+        image = self._brought(*open_picture(path), path)
         pixels = fit_frame(image, self._network.input_px, self._network.view)
         self.read_s.append(time.perf_counter() - began)
         return pixels
 
-    def _brought(self, image: Image.Image, path: Path) -> Image.Image:
+    def _brought(self, image: Image.Image, turn: Orientation, path: Path) -> Image.Image:
         """Resample the picture to the training camera, where both cameras are known."""
-        known = None if self._target is None else self._camera.of(image, path)
+        known = None if self._target is None else self._camera.of(image, path, turn)
         if known is None or self._target is None:
             return image
         self.resampled.add(path)
+        if self._camera.turns_with(image, turn):
+            self.turned.add(path)
         if known not in self._resamplers:
             same = same_view(known, self._target)
             self._resamplers[known] = None if same else Resampler(known, self._target)
@@ -417,6 +424,13 @@ def _in(directory: Path) -> list[Path]:
     if any(directory.glob("seq-[0-9]*")):
         raise InputError(f"{directory}: is a data set; name its sequences, {directory}/seq-01")
     found = [path for path in files if _is_picture(path.name.lower())]
+    heif = [path for path in found if path.suffix.lower() in HEIF_SUFFIXES]
+    if heif and not reads_heif():
+        which = f"{len(heif)} of {len(found)} photographs are HEIC ({heif[0].name}, ...)"
+        if len(heif) == len(found):
+            raise InputError(f"{directory}: {which}, which needs pillow-heif: {HEIF_REMEDY}")
+        log.warning("%s: %s and left out: %s", directory, which, HEIF_REMEDY)
+        found = [path for path in found if path not in heif]
     if not found:
         raise InputError(f"{directory}: holds no {', '.join(SUFFIXES)}; name another directory")
     return found

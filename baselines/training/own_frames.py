@@ -12,7 +12,7 @@ import logging
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,13 @@ from baselines.config.learning import NetworkConfig
 from baselines.training.checkpoint import FrameCamera
 from baselines.training.resample import Resampler, same_view
 from synfeal.camera.calibration import Calibration
+from synfeal.camera.orientation import (
+    Orientation,
+    Upright,
+    stored_from_upright,
+    turned,
+    upright,
+)
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.depth import MILLIMETRES
@@ -177,8 +184,11 @@ def check_posed_depth(own: OwnFrames, photographs: PhotographCamera) -> None:
     known: CameraConfig | None = None
     if own.camera is not None:
         known = CameraConfig.model_validate(own.camera.model_dump())
-    elif (given := photographs.of(read_image(own.color[0]), own.color[0])) is not None:
-        known = CameraConfig.model_validate(asdict(given))
+    else:
+        image, turn = upright(read_image(own.color[0]))
+        given = photographs.of(image, own.color[0], turn)
+        if given is not None:  # depth and poses are of the stored pixels
+            known = CameraConfig.model_validate(asdict(turned(given, turn.back)))
     if known is None or image_size(depth[0]) != (known.width, known.height):
         return
     units_per_m = TUM_UNITS_PER_M if is_tum(own.folder) else MILLIMETRES
@@ -259,6 +269,9 @@ def pack_own_frames(
 ) -> PackedFrames:
     """Write ``frames.npy``, ``frames.json`` and ``labels.csv`` of one or more data sets.
 
+    Photographs are turned upright as EXIF says, and their poses with them: so are those that will
+    be localized.
+
     Args:
         sets: Data sets; the first decides which world the labels are in.
         photographs: Camera of those that do not name one.
@@ -273,30 +286,33 @@ def pack_own_frames(
     jobs = [(own, file) for own in sets for file in own.color]
     resamplers: dict[Calibration, Resampler | None] = {}
 
-    def pixels(job: tuple[OwnFrames, FrameFile]) -> NDArray[np.uint8]:
+    def pixels(job: tuple[OwnFrames, FrameFile]) -> tuple[NDArray[np.uint8], Orientation]:
         own, file = job
-        image = read_image(file, "RGB")
-        if own.camera is None:
-            image = _resampled(image, file, photographs, target, resamplers)
-        elif image.size != (own.camera.width, own.camera.height):
+        image, turn = read_image(file, "RGB"), Orientation.UPRIGHT
+        if own.camera is None and own.wide is None:
+            photograph = image, turn = upright(image)
+            image = _resampled(photograph, file, photographs, target, resamplers)
+        elif own.camera is not None and image.size != (own.camera.width, own.camera.height):
             raise InputError(
                 f"{file}: is of {image.width}x{image.height} pixels, {own.folder / MANIFEST} says"
                 f" {own.camera.width}x{own.camera.height}; collect the data set again"
             )
-        return fit_frame(image, network.input_px, network.view)
+        return fit_frame(image, network.input_px, network.view), turn
 
+    turns: list[Orientation] = []
     with (
         new_packed(frames, len(jobs), network.input_px) as packed,
         Progress(len(jobs), "pack") as progress,
         ThreadPoolExecutor(READERS) as readers,
     ):
         try:
-            for index, small in enumerate(readers.map(pixels, jobs)):
+            for index, (small, turn) in enumerate(readers.map(pixels, jobs)):
                 packed[index] = small
+                turns.append(turn)
                 progress.update()
         finally:
             readers.shutdown(cancel_futures=True)
-    write_pose_table(labels, _joined(sets))
+    write_pose_table(labels, _joined(_turned_upright(sets, turns)))
     _write_record(frames, target)
     return PackedFrames(
         frames=frames,
@@ -326,7 +342,8 @@ def _target_camera(sets: Sequence[OwnFrames], photographs: PhotographCamera) -> 
         )
     if cameras:
         return next(iter(cameras))
-    known = photographs.of(read_image(sets[0].color[0]), sets[0].color[0])
+    image, turn = upright(read_image(sets[0].color[0]))
+    known = photographs.of(image, sets[0].color[0], turn)
     if known is None:
         return None
     return FrameCamera(
@@ -344,15 +361,26 @@ def _refuse_beside(own: OwnFrames, camera: CameraConfig, sets: Sequence[OwnFrame
             )
 
 
+def _turned_upright(sets: Sequence[OwnFrames], turns: Sequence[Orientation]) -> list[OwnFrames]:
+    """Turn the poses of all sets as their photographs were turned."""
+    done, first = [], 0
+    for own in sets:
+        turn = np.array([stored_from_upright(t) for t in turns[first : first + len(own)]])
+        done.append(replace(own, world_from_cam=own.world_from_cam @ turn))
+        first += len(own)
+    return done
+
+
 def _resampled(
-    image: Image.Image,
+    photograph: Upright,
     file: FrameFile,
     photographs: PhotographCamera,
     target: FrameCamera | None,
     resamplers: dict[Calibration, Resampler | None],
 ) -> Image.Image:
     """Resample a photograph to ``target``; leave it where one of the two cameras is unknown."""
-    known = None if target is None else photographs.of(image, file)
+    image, turn = photograph
+    known = None if target is None else photographs.of(image, file, turn)
     if known is None or target is None:
         return image
     if known not in resamplers:

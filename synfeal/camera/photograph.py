@@ -10,6 +10,7 @@ from typing import Literal
 from PIL import ExifTags, Image
 
 from synfeal.camera.calibration import Calibration, read_calibration
+from synfeal.camera.orientation import Orientation, turned, upright_size
 from synfeal.errors import InputError
 
 PINHOLE = (0.0, 0.0, 0.0, 0.0, 0.0)
@@ -60,12 +61,18 @@ class PhotographCamera:
             return "focal"
         return "exif" if self.exif else None
 
-    def of(self, image: Image.Image, name: object) -> Calibration | None:
+    def of(
+        self, image: Image.Image, name: object, turn: Orientation = Orientation.UPRIGHT
+    ) -> Calibration | None:
         """Return the intrinsics of one photograph.
+
+        A calibration file is of the sensor, so it is turned as the photograph was; one that fits
+        the upright photograph alone is of that, as OpenCV sees it, and is taken as it is.
 
         Args:
             image: The photograph, upright.
-            name: What messages call it.
+            name: Its name in messages.
+            turn: How its stored pixels were turned to stand upright.
 
         Returns:
             Its camera; None where nothing is known of it.
@@ -75,16 +82,46 @@ class PhotographCamera:
         """
         width, height = image.size
         if self.calibration is not None:
-            try:
-                return self.calibration.scaled(width, height)
-            except ValueError as error:
-                raise InputError(f"{name}: its camera {self.file} {error}") from error
+            return self._calibrated(self.calibration, image.size, name, turn)
         if self.focal_px is not None:
             return _centred(width, height, self.focal_px)
         if not self.exif:
             return None
         focal_px = exif_focal_px(image)
         return None if focal_px is None else _centred(width, height, focal_px)
+
+    def turns_with(self, image: Image.Image, turn: Orientation) -> bool:
+        """Tell whether :meth:`of` turns the calibration file for a photograph."""
+        if self.calibration is None or turn is Orientation.UPRIGHT:
+            return False
+        return _scaled(self.calibration, upright_size(image.size, turn)) is not None
+
+    def _calibrated(
+        self, calibration: Calibration, size: tuple[int, int], name: object, turn: Orientation
+    ) -> Calibration:
+        """Scale the calibration to the stored pixels and turn it, or scale it to upright ones."""
+        stored = _scaled(calibration, upright_size(size, turn))
+        if stored is not None:
+            return turned(stored, turn)
+        try:
+            return calibration.scaled(*size)
+        except ValueError as error:
+            lying = _scaled(calibration, (size[1], size[0])) is not None
+            remedy = (
+                ". The picture was turned and its EXIF does not say which way; take the file as the"
+                " camera stored it, or give a calibration of turned pictures"
+            )
+            raise InputError(
+                f"{name}: its camera {self.file} {error}{remedy if lying else ''}"
+            ) from error
+
+
+def _scaled(calibration: Calibration, size: tuple[int, int]) -> Calibration | None:
+    """Scale a calibration to a width and height, pixels; None where the proportions differ."""
+    try:
+        return calibration.scaled(*size)
+    except ValueError:
+        return None
 
 
 def exif_focal_px(image: Image.Image) -> float | None:

@@ -17,7 +17,7 @@ from synfeal.captures.capture import (
     rigid_pose,
 )
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import depth_reader, read_photograph
+from synfeal.captures.images import depth_reader, photograph_size, read_photograph
 from synfeal.dataset.depth import MILLIMETRES
 from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
@@ -126,7 +126,7 @@ def _camera(camera: Any, place: str) -> Calibration:
 def _frame(
     path: Path, name: str, image: Any, photograph: Path, camera: Calibration
 ) -> CapturedFrame:
-    size = image_size(photograph)
+    size = photograph_size(photograph, camera.width, camera.height)
     if size != (camera.width, camera.height):
         camera = resized(camera, *size)
     depth = _depth_of(path, name)

@@ -10,20 +10,54 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.camera.orientation import orientation_of, upright, upright_size
 from synfeal.captures.capture import Colors, Depth
 from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import FrameFile
-from synfeal.dataset.images import decode_image, read_image, read_rgb
+from synfeal.dataset.images import decode_image, image_size_and_turn, read_image, read_rgb
 from synfeal.errors import InputError
+
+# Sizes that were rounded differ in their proportions by this much.
+STRETCH = 0.02
 
 
 def read_photograph(path: Path, width: int, height: int) -> Colors:
     """Read a photograph (H, W, 3) as its pixels are stored: a capture's calibrations are of those.
 
+    Where only the photograph that is turned as EXIF says has the calibration's size, it is turned.
+
     Raises:
-        InputError: It is missing, damaged, or not of this size.
+        InputError: It is missing, damaged, or of this size neither way.
     """
+    image = read_image(path, "RGB")
+    turn = orientation_of(image)
+    if image.size != (width, height) and upright_size(image.size, turn) == (width, height):
+        return np.asarray(upright(image).image)
     return read_rgb(path, size=(width, height), remedy="; are both of one capture?")
+
+
+def photograph_size(path: Path, width: int, height: int) -> tuple[int, int]:
+    """Return the size in pixels at which :func:`read_photograph` is to read a photograph.
+
+    That is the stored one, unless EXIF swaps its sides and the calibration has the proportions of
+    the upright one: some programs turn what they calibrate.
+
+    Args:
+        path: Image file.
+        width: Width that the calibration is of, pixels.
+        height: Height that the calibration is of, pixels.
+
+    Raises:
+        InputError: It is missing or no image, or of other proportions than the calibration.
+    """
+    stored, turn = image_size_and_turn(path)
+    for size in (stored, upright_size(stored, turn)):
+        if abs(size[0] * height - size[1] * width) <= STRETCH * size[1] * width:
+            return size
+    raise InputError(
+        f"{path}: is of {stored[0]} x {stored[1]} pixels, its calibration of {width} x {height},"
+        " which are other proportions; give the photographs that were calibrated"
+    )
 
 
 def decode_photograph(content: bytes, place: object) -> Colors:

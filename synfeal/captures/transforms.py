@@ -18,7 +18,7 @@ from synfeal.captures.capture import (
     rigid_pose,
 )
 from synfeal.captures.formats import CaptureFormat
-from synfeal.captures.images import depth_reader, read_photograph
+from synfeal.captures.images import depth_reader, photograph_size, read_photograph
 from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 from synfeal.records.files import lies_in, read_json
@@ -93,8 +93,12 @@ def _frame(
     units_per_m: float,
     place: str,
 ) -> CapturedFrame:
+    said = {**values, **entry}
     size = image_size(photograph)
-    camera = _camera({**values, **entry}, size, place)
+    if "w" in said and "h" in said:
+        with read_as(place, "a camera", TypeError, ValueError):
+            size = photograph_size(photograph, int(said["w"]), int(said["h"]))
+    camera = _camera(said, size, place)
     pose = rigid_pose(entry.get("transform_matrix"), f"{place}.transform_matrix") @ GL_FROM_CAM
     depth_file, depth_camera = None, None
     if entry.get("depth_file_path") is not None:

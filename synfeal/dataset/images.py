@@ -2,7 +2,7 @@
 
 Pixels are taken as they are stored, because poses and calibrations are of the stored pixels. A
 camera that was held upright may have stored them lying and noted the turn in EXIF:
-:func:`orientation_of` reports it, :func:`upright` follows it.
+:mod:`synfeal.camera.orientation` reports and follows it.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from enum import IntEnum
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import ExifTags, Image, ImageOps
+from PIL import Image
 
+from synfeal.camera.orientation import Orientation, orientation_of
 from synfeal.dataset.frame_files import MOST_PIXELS, FrameFile, decode_png
 from synfeal.errors import InputError, read_as
 
@@ -33,27 +33,18 @@ IMAGE_DAMAGE = (
     EOFError,
     struct.error,
     MemoryError,
+    RuntimeError,  # pillow-heif
     Image.DecompressionBombError,
 )
+# HEIF as phones write it; its files begin with a box ``ftyp`` of one of these brands (ISO/IEC
+# 23008-12). Pillow decodes it with the help of pillow-heif.
+HEIF_SUFFIXES = (".heic", ".heif")
+HEIF_BRANDS = (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1")
+HEIF = "HEIF"
+HEIF_REMEDY = "pip install 'synfeal[heic]', or convert to JPEG"
 # A frame of nearly one colour: every so many rows and columns are looked at, and so many of their
 # pixels are within so many grey levels of the median.
 LOOKED_AT, SAME, ONE_COLOR = 4, 2, 0.95
-
-
-class Orientation(IntEnum):
-    """EXIF's orientation: how stored pixels are to be turned to stand upright.
-
-    Source: JEITA CP-3451 (Exif 2.32), tag 0x0112. Turns are clockwise.
-    """
-
-    UPRIGHT = 1
-    MIRRORED = 2
-    TURNED_180 = 3
-    MIRRORED_TURNED_180 = 4
-    MIRRORED_TURNED_270 = 5
-    TURNED_90 = 6
-    MIRRORED_TURNED_90 = 7
-    TURNED_270 = 8
 
 
 def read_image(
@@ -146,27 +137,31 @@ def image_size(path: FrameFile) -> tuple[int, int]:
     Raises:
         InputError: It is missing or no image.
     """
+    return image_size_and_turn(path)[0]
+
+
+def image_size_and_turn(path: FrameFile) -> tuple[tuple[int, int], Orientation]:
+    """Read width and height of the stored pixels, and EXIF's turn, without decoding an image.
+
+    Raises:
+        InputError: It is missing or no image.
+    """
     with (
         read_as(path, "an image", *IMAGE_DAMAGE),
         _opened(path) as file,
         opened_image(file) as image,
     ):
-        return image.size
+        return image.size, orientation_of(image)
 
 
-def orientation_of(image: Image.Image) -> Orientation:
-    """Return how EXIF says the pixels of an image are turned; upright where it says nothing."""
+def reads_heif() -> bool:
+    """Tell whether HEIF can be read here; make Pillow read it if so."""
     try:
-        return Orientation(image.getexif().get(ExifTags.Base.Orientation, 1))
-    except ValueError:  # numbers and text that the standard does not know
-        return Orientation.UPRIGHT
-
-
-def upright(image: Image.Image) -> Image.Image:
-    """Turn an image as its EXIF orientation says."""
-    if orientation_of(image) is Orientation.UPRIGHT:
-        return image
-    return ImageOps.exif_transpose(image)
+        from pillow_heif import register_heif_opener
+    except ImportError:
+        return False
+    register_heif_opener()
+    return True
 
 
 def is_of_one_color(rgb: NDArray[np.uint8]) -> bool:
@@ -218,6 +213,11 @@ def _decoded(
     content: bytes, place: object, formats: tuple[str, ...] | None, most_pixels: int, remedy: str
 ) -> Image.Image:
     """Decode every row; our own PNG files by the fast codec."""
+    if content[4:8] == b"ftyp" and content[8:12] in HEIF_BRANDS:
+        if not reads_heif():
+            raise InputError(f"{place}: is HEIC, which needs pillow-heif: {HEIF_REMEDY}")
+    elif formats is not None:
+        formats = tuple(name for name in formats if name != HEIF)  # which Pillow may not know
     if formats is None or "PNG" in formats:
         pixels = decode_png(content)
         if pixels is not None and pixels.shape[0] * pixels.shape[1] <= most_pixels:

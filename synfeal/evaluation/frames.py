@@ -11,8 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.camera.orientation import stored_from_upright
 from synfeal.dataset.frame_files import sequence_at
 from synfeal.dataset.frame_poses import read_poses, rigid_problems
+from synfeal.dataset.images import image_size_and_turn
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.pose_list import KITTI, FrameKey, PoseList
 from synfeal.dataset.pose_table import IMAGE, read_pose_table
@@ -51,6 +53,8 @@ class ScoredFrames:
         gap: Frame that the numbers of the others leave out.
         frame_key: How a file of poses says which frame one is of.
         n_left_out: Poses of a file that are not scored, because nothing was estimated then.
+        stored_from_upright: Rotations (N, 4, 4) by which EXIF turns the photographs; None where it
+            turns none.
     """
 
     split: str
@@ -61,6 +65,7 @@ class ScoredFrames:
     gap: Frame | None = None
     frame_key: FrameKey | None = None
     n_left_out: int = 0
+    stored_from_upright: Array | None = None
 
     @property
     def title(self) -> str:
@@ -134,12 +139,15 @@ def _unsplit_photographs(dataset: Path) -> ScoredFrames:
     frames = tuple(_frame_named(dataset, name) for name in photographs.names)
     stems = [frame.sequence.stem for frame in frames]
     path = np.unique(stems, return_inverse=True)[1].astype(np.int64)
+    turns = [image_size_and_turn(file)[1] for file in photographs.color]
+    rotations = np.array([stored_from_upright(turn) for turn in turns])
     return ScoredFrames(
         split="all",
         names=tuple(frame.name for frame in frames),
         world_from_cam=photographs.world_from_cam,
         path=path,
         frames=frames,
+        stored_from_upright=rotations if any(turn.quarters for turn in turns) else None,
     )
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -30,9 +31,10 @@ from synfeal.evaluation.reference import (
 )
 from synfeal.evaluation.reprojection import dcre, dcre_summary, depth_of_images
 from synfeal.geometry.limits import FARTHEST_M
-from synfeal.geometry.poses import quat_wxyz_of, umeyama_sim3
+from synfeal.geometry.poses import pose_error, quat_wxyz_of, umeyama_sim3
 from synfeal.records.progress import Progress
 
+log = logging.getLogger("synfeal")
 Array = NDArray[np.float64]
 Align = Literal["none", "se3", "sim3"]
 
@@ -106,6 +108,7 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
         frames, row = met_in_time(frames, estimates, poses, clock)
     else:
         row = _matched(frames, estimates, poses, settings)
+    frames = _turned_as_estimated(frames, estimates, row, settings)
     convention, predicted = _taken(poses, frames, estimates, row, settings, settings.convention)
     yardsticks = {DATASET: frames.world_from_cam}
     if settings.labels:
@@ -176,6 +179,39 @@ def _matched(
             " frames a second of the data set"
         )
     return match(frames, estimates, path, settings.rate_hz or DEFAULT_RATE_HZ)
+
+
+def _turned_as_estimated(
+    frames: ScoredFrames, estimates: PoseList, row: NDArray[np.int64], settings: Settings
+) -> ScoredFrames:
+    """Turn the poses of photographs that EXIF turns, if the estimates are of upright ones.
+
+    The poses of a data set are of the pixels as they are stored. ``synfeal localize`` answers for
+    the upright photograph, COLMAP for the stored one; the two are 90 degrees or more apart.
+    """
+    if frames.stored_from_upright is None:
+        return frames
+    convention = named_convention(settings.convention, estimates.convention)
+    answers = estimates.world_from_cam(convention)[row]
+    upright = frames.world_from_cam @ frames.stored_from_upright
+    turned = np.abs(frames.stored_from_upright - np.eye(4)).max(axis=(1, 2)) > 0
+    compared = turned & (row >= 0) & np.isfinite(answers).all(axis=(1, 2))
+    if not compared.any():
+        return frames
+    errors = [
+        float(np.median(pose_error(answers[compared], poses[compared])[1]))
+        for poses in (frames.world_from_cam, upright)
+    ]
+    is_upright = errors[1] < errors[0]
+    log.warning(
+        "EXIF turns %d of %d photographs; the estimates fit the poses of %s",
+        int(turned.sum()),
+        len(turned),
+        "upright photographs, so those of the data set are turned with them"
+        if is_upright
+        else "the pixels as they are stored, and are scored against those",
+    )
+    return replace(frames, world_from_cam=upright) if is_upright else frames
 
 
 def _camera_and_depth(

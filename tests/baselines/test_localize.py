@@ -1,6 +1,7 @@
 """``synfeal localize``: pictures in, poses out, as a person uses it."""
 
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,13 @@ import torch
 from PIL import Image
 
 from baselines.training.checkpoint import FrameCamera, frame_camera
-from baselines.training.localize import HEADER, PictureReader, localize, read_picture
+from baselines.training.localize import (
+    HEADER,
+    PictureReader,
+    find_pictures,
+    localize,
+    read_picture,
+)
 from baselines.training.predict import predict, predict_poses
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.cli import main
@@ -19,6 +26,7 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
+from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_from_quat, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.records.files import write_json
@@ -375,3 +383,15 @@ def test_without_a_calibration_nothing_is_resampled(folder, tmp_path):
     model = save(tmp_path / "model.pt", untrained(camera=TRAINING))
     done = localize(model, [folder], tmp_path / "p.csv", "cpu", camera=PhotographCamera())
     assert (done.n_resampled, done.calibration, done.outside) == (0, None, 0.0)
+
+
+def test_heic_in_a_folder_is_counted_where_it_cannot_be_read(folder, monkeypatch, caplog):
+    (folder / "IMG_0001.HEIC").write_bytes(b"\0\0\0\x1cftypheic" + bytes(100))
+    assert [path.name for path in find_pictures([folder])] == ["IMG_0001.HEIC", "a.png", "b.png"]
+    monkeypatch.setitem(sys.modules, "pillow_heif", None)
+    assert [path.name for path in find_pictures([folder])] == ["a.png", "b.png"]
+    assert "1 of 3 photographs are HEIC (IMG_0001.HEIC, ...) and left out" in caplog.text
+    for name in "ab":
+        (folder / f"{name}.png").unlink()
+    with pytest.raises(InputError, match=r"1 of 1 photographs are HEIC.*synfeal\[heic\]"):
+        find_pictures([folder])

@@ -98,6 +98,29 @@ def test_photographs_of_another_room_are_not_localized(place, tmp_path, capsys):
     assert f"0 of {N_PHOTOS} photographs localized" in said.out
 
 
+def test_a_photograph_that_exif_turns_is_found_with_the_calibration_of_the_sensor(
+    place, tmp_path, capsys
+):
+    """Held upright or upside down, the sensor stores what it sees; the pose is of the upright."""
+    truth, half = looking_about(3, 2), np.diag([-1.0, -1.0, 1.0, 1.0])
+    quarter = pose_matrix(rotation_from_rpy([0.0, 0.0, -np.pi / 2]), np.zeros(3))
+    held = [truth[0] @ np.linalg.inv(quarter), truth[1] @ half, truth[2]]
+    write_photographs(tmp_path / "photos", textures(0), held)
+    for number, orientation in enumerate((6, 3, 1)):
+        exif = Image.Exif()
+        exif[0x0112] = orientation
+        path = tmp_path / f"photos/photo-{number:02d}.png"
+        with Image.open(path) as image:
+            image.load()
+        image.save(path, exif=exif)
+    rows, poses = localized(place, tmp_path / "photos", tmp_path / "poses.csv", "--world", "mesh")
+    assert [row["status"] for row in rows] == ["localized"] * 3
+    position_m, angle_rad = pose_error(poses, truth)
+    assert position_m.max() < 3 * PIXEL_M
+    assert np.degrees(angle_rad).max() < 1.0
+    assert "2 of them stand upright by their EXIF" in capsys.readouterr().out
+
+
 def test_a_picture_without_anything_on_it_is_not_localized(place, tmp_path):
     blank = tmp_path / "blank.png"
     Image.new("L", (PHOTO.width, PHOTO.height), 90).save(blank)

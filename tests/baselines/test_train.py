@@ -176,6 +176,28 @@ def test_photographs_join_rendered_frames_in_their_world_and_camera(calm, photog
     np.testing.assert_allclose(described(made.model)["sequence_from_world"], moved)
 
 
+def test_photographs_that_exif_turns_are_learned_upright(photographs, tmp_path):
+    folder = Path(shutil.copytree(photographs, tmp_path / "turned"))
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    for index in (0, 1):
+        path = folder / f"frame-{index:06d}.color.jpg"
+        with Image.open(path) as image:
+            image.load()
+        image.save(path.with_suffix(".png"), exif=exif)
+        path.unlink()
+    own = read_own_frames(folder, ())
+    packed = pack_own_frames([own], UNKNOWN, NETWORK, tmp_path)
+    with Image.open(folder / "frame-000001.color.png") as image:
+        clockwise = image.transpose(Image.Transpose.ROTATE_270)
+    np.testing.assert_array_equal(np.load(packed.frames)[1], fit_frame(clockwise, 64, "whole"))
+    poses = read_pose_table(packed.labels).world_from_cam
+    np.testing.assert_allclose(poses[2:], own.world_from_cam[2:], atol=1e-9)
+    # The upright picture's x is up the stored one, its y to the right.
+    np.testing.assert_allclose(poses[:2, :3, 0], -own.world_from_cam[:2, :3, 1], atol=1e-9)
+    np.testing.assert_allclose(poses[:2, :3, 1], own.world_from_cam[:2, :3, 0], atol=1e-9)
+
+
 def test_parts_of_a_sequence_can_be_taken_and_are_cut_into_blocks(photographs):
     own = read_own_frames(photographs, (FrameRange(0, 5), FrameRange(10, 14)))
     names = [path.name[6:12] for path in own.color]

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from synfeal.camera.orientation import Orientation, orientation_of, upright
 from synfeal.dataset.frame_files import ArchivedFile, encode_png
 from synfeal.dataset.images import (
-    Orientation,
     image_size,
     is_of_one_color,
-    orientation_of,
     read_image,
     read_rgb,
-    upright,
 )
 from synfeal.errors import InputError
 
@@ -90,7 +88,7 @@ def test_exif_turns_are_reported_and_followed_on_demand(orientation, tmp_path):
     image = read_image(path, "RGB")
     assert np.array_equal(np.asarray(image), RGB)  # as stored
     assert orientation_of(image) is orientation
-    assert np.array_equal(np.asarray(upright(image)), UPRIGHT[orientation](RGB))
+    assert np.array_equal(np.asarray(upright(image).image), UPRIGHT[orientation](RGB))
 
 
 @pytest.mark.parametrize("value", [0, 9])
@@ -99,7 +97,7 @@ def test_an_orientation_that_the_standard_does_not_know_turns_nothing(value, tmp
     exif[0x0112] = value
     image = read_image(written(tmp_path / "photo.png", RGB, exif=exif))
     assert orientation_of(image) is Orientation.UPRIGHT
-    assert np.array_equal(np.asarray(upright(image)), RGB)
+    assert np.array_equal(np.asarray(upright(image).image), RGB)
 
 
 def png_of(pixels):
