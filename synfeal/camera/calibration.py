@@ -1,6 +1,7 @@
-"""Cameras from calibration files: OpenCV (YAML, JSON), ROS and COLMAP (text).
+"""Cameras from calibration files: OpenCV (YAML, JSON), ROS, COLMAP (text) and other programs.
 
-The JSON that ``synfeal scan`` writes beside a mesh is one too, and the manifest of a data set.
+What other programs write is translated by :mod:`synfeal.camera.programs`. The JSON that
+``synfeal scan`` writes beside a mesh is one too, and the manifest of a data set.
 
 OpenCV and ROS put the centre of the first pixel at (0, 0); :class:`Calibration` and COLMAP at
 (0.5, 0.5).
@@ -18,6 +19,7 @@ from typing import Any, Literal
 
 import yaml
 
+from synfeal.camera.programs import as_opencv
 from synfeal.errors import InputError, why
 from synfeal.records.files import PlainLoader
 
@@ -56,7 +58,8 @@ COLMAP_FISHEYE = {
 }
 
 UNKNOWN = (
-    "is no calibration file: OpenCV's or ROS's end in .yaml, .yml or .json, COLMAP's is cameras.txt"
+    "is no calibration file: those of OpenCV, ROS, Kalibr, RealSense, ORB-SLAM and Open3D end in"
+    " .yaml, .yml or .json, COLMAP's is cameras.txt"
 )
 BINARY = (
     "COLMAP's binary format is not read; convert the folder it is in: colmap model_converter"
@@ -172,11 +175,19 @@ def _read(path: Path) -> Calibration:
             return _from_record(values) or _from_mapping(values)
         if text.startswith("%YAML:"):  # OpenCV's header, which YAML has no name for
             text = text.partition("\n")[2]
-        return _from_mapping(yaml.load(text, _Loader))  # noqa: S506 (a SafeLoader)
+        return _from_mapping(_first_document(text))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError, JSONDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a calibration ({why(error)})") from error
     except ValueError as error:
         raise InputError(f"{path}: {why(error)}") from error
+
+
+def _first_document(text: str) -> Any:
+    """Read the first of the documents of YAML: ``ros2 topic echo`` writes one for each message."""
+    for document in yaml.load_all(text, _Loader):
+        if document is not None:
+            return document
+    return None
 
 
 def _from_record(values: Any) -> Calibration | None:
@@ -214,6 +225,7 @@ def _from_mapping(values: Any) -> Calibration:
     """Read what OpenCV and ROS write from plain values."""
     if not isinstance(values, Mapping):
         raise ValueError(f"must hold a mapping of keys, found {_shortened(values)}")
+    values = as_opencv(values)
     model = values.get("distortion_model", MODELS[0])
     if model not in (*MODELS, *FISHEYE_MODELS):
         raise ValueError(
@@ -300,6 +312,10 @@ def _from_colmap(text: str) -> Calibration:
     """Read a COLMAP table of one camera: CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]."""
     rows = [line.split() for line in text.splitlines() if not line.lstrip().startswith("#")]
     rows = [row for row in rows if row]
+    if (matrix := _matrix_in(rows)) is not None:
+        raise ValueError(matrix)
+    if len({tuple(row[1:]) for row in rows}) == 1:  # one camera for each image, all the same
+        rows = rows[:1]
     if len(rows) > 1:
         raise ValueError(
             f"holds {len(rows)} cameras; keep the line of the one you want in a file of its own"
@@ -325,6 +341,26 @@ def _from_colmap(text: str) -> Calibration:
     coefficients = COLMAP_MODELS["FULL_OPENCV"][4:]
     distortion = _five("PARAMS", [held.get(name, 0.0) for name in coefficients])
     return Calibration(width_px, height_px, fx, fy, cx, cy, distortion)
+
+
+def _matrix_in(rows: Sequence[Sequence[str]]) -> str | None:
+    """Say what to do with the matrix of a camera, which lacks its size; None for anything else."""
+    shape = (len(rows), *{len(row) for row in rows})
+    if shape not in ((3, 3), (3, 4), (4, 4)):
+        return None
+    try:
+        values = [[float(cell) for cell in row] for row in rows]
+    except ValueError:
+        return None
+    if values[2][:3] != [0.0, 0.0, 1.0]:
+        return f"holds a matrix of {shape[0]} x {shape[1]} that is no camera's; is it a pose?"
+    fx, fy, cx, cy = values[0][0], values[1][1], values[0][2], values[1][2]
+    return (
+        f"holds a matrix of {shape[0]} x {shape[1]}, which does not say the size of the image; put"
+        f" '1 PINHOLE WIDTH HEIGHT {fx:g} {fy:g} {cx:g} {cy:g}' in its place, with the sides of the"
+        " image in pixels (cx and cy from the corner of the first pixel, half a pixel more than"
+        " OpenCV's)"
+    )
 
 
 def _shortened(value: Any) -> str:

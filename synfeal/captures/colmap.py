@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from synfeal.captures.formats import CaptureFormat
 from synfeal.captures.images import depth_reader, photograph_size, read_photograph
 from synfeal.dataset.depth import MILLIMETRES
 from synfeal.dataset.images import image_size
+from synfeal.dataset.pose_models import image_lines
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import inverse
 from synfeal.records.files import lies_in
@@ -39,16 +42,11 @@ def _model_of(path: Path) -> Path | None:
 
 
 def _read(path: Path) -> Capture:
-    import pycolmap
-
     folder = _model_of(path)
     if folder is None:
         raise InputError(f"{path}: holds no cameras and images, .bin or .txt, of a COLMAP model")
-    points = [folder / f"points3D{end}" for end in (".bin", ".txt")]
-    if not any(file.is_file() for file in points):
-        raise InputError(f"{points[0]}: missing; a model of COLMAP has it, if only an empty one")
     with read_as(folder, "a model of COLMAP", OSError, ValueError, RuntimeError):
-        model = pycolmap.Reconstruction(folder)
+        model = _reconstruction(folder)
     registered = [model.images[i] for i in model.reg_image_ids()]
     if not registered:
         raise InputError(f"{folder}: none of its images has a pose")
@@ -72,23 +70,43 @@ def _read(path: Path) -> Capture:
     return Capture(path, FORMAT.name, tuple(frames), notes=notes)
 
 
+def _reconstruction(folder: Path) -> Any:
+    """Read cameras, images and poses of a model with COLMAP's own reader.
+
+    Of text it is given what it needs, line by line: it skips every other image where the second
+    lines are left out, and wants a file of points that nothing here reads.
+    """
+    import pycolmap
+
+    if (folder / "images.bin").is_file():
+        points = folder / "points3D.bin"
+        if not points.is_file():
+            raise InputError(
+                f"{points}: missing; copy it, too, or convert the model to text, which does"
+                " without: colmap model_converter --output_type TXT"
+            )
+        return pycolmap.Reconstruction(folder)
+    with tempfile.TemporaryDirectory() as name:
+        copy = Path(name)
+        shutil.copyfile(folder / "cameras.txt", copy / "cameras.txt")
+        lines = [f"{line}\n\n" for line, _ in image_lines(folder / "images.txt")]
+        (copy / "images.txt").write_text("".join(lines), encoding="utf-8")
+        (copy / "points3D.txt").touch()
+        return pycolmap.Reconstruction(copy)
+
+
 def _names(folder: Path, images: list[Any]) -> dict[int, str]:
     """Return the names of images by their numbers.
 
     COLMAP's reader of text ends a name at its first blank; the rest of the line is the name.
     """
     names = {int(image.image_id): str(image.name) for image in images}
-    file = folder / "images.txt"
-    if (folder / "images.bin").is_file() or not file.is_file():
+    if (folder / "images.bin").is_file():
         return names
-    with read_as(file, "a model of COLMAP"):
-        lines = file.read_text(encoding="utf-8").splitlines()
-    for line in lines:
-        cells = line.split(None, 9)
-        if len(cells) == 10 and cells[0].isdecimal():
-            number, name = int(cells[0]), cells[9].strip()
-            if name.startswith(names.get(number, "\0")):
-                names[number] = name
+    for line, pose in image_lines(folder / "images.txt"):
+        number = int(line.split(None, 1)[0])
+        if number in names:
+            names[number] = pose.name
     return names
 
 

@@ -72,22 +72,33 @@ def _estimates(kind: str, poses: list[NamedPose]) -> PoseList:
 
 
 def _text_poses(path: Path) -> list[NamedPose]:
+    return [pose for _, pose in image_lines(path)]
+
+
+def image_lines(path: Path) -> list[tuple[str, NamedPose]]:
+    """List the first lines of the images in ``images.txt`` with what they say.
+
+    The second lines, of points, may be there or not: people leave them out by mistake.
+
+    Raises:
+        InputError: The file cannot be read, or holds a line that is neither.
+    """
     with read_as(path, "a COLMAP model"):
         lines = path.read_text(encoding="utf-8-sig").splitlines()
-    poses = []
+    found = []
     is_points = False  # whether the second line of an image is due
     for number, line in enumerate(lines, start=1):
         if line.lstrip().startswith("#"):
             continue
         pose = _pose_of_line(line, f"line {number}")
         if pose is not None:
-            poses.append(pose)
+            found.append((line, pose))
         elif line.strip() and not is_points:
             raise InputError(
                 f"{path}: line {number} is no image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
             )
         is_points = pose is not None
-    return poses
+    return found
 
 
 def _pose_of_line(line: str, place: str) -> NamedPose | None:

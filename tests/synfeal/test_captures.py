@@ -160,6 +160,27 @@ def test_large_photographs_become_smaller_and_their_camera_with_them(tmp_path):
     assert np.abs(small - blocks).mean() < 3.0
 
 
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_a_text_model_of_colmap_needs_neither_second_lines_nor_points(ending, tmp_path):
+    path, world_from_room = written("colmap", tmp_path)
+    model = path / "sparse/0"
+    images = [line for line in (model / "images.txt").read_text().splitlines() if line]
+    (model / "images.txt").write_bytes("".join(line + ending for line in images).encode())
+    (model / "points3D.txt").unlink()
+    found = read_capture(path)
+    assert [frame.name for frame in found.frames] == [line.split(None, 9)[9] for line in images]
+    np.testing.assert_allclose(
+        found.world_from_cam, world_from_room @ shots().room_from_cam, atol=1e-9
+    )
+
+
+def test_a_binary_model_of_colmap_without_points_is_told_what_does_without(tmp_path):
+    path, _ = written("colmap-binary", tmp_path)
+    (path / "sparse/0/points3D.bin").unlink()
+    with pytest.raises(InputError, match=r"points3D\.bin: missing.*convert the model to text"):
+        read_capture(path)
+
+
 def test_low_confidence_is_no_measurement(tmp_path):
     path, _ = written("3d-scanner-app", tmp_path)
     sure = np.full(shots().small_depth_m[0].shape, 2, np.uint8)
