@@ -104,6 +104,8 @@ class CollectOptions(ViewOptions, total=False):
     unit_m: float
     test_frames: int
     depth: bool
+    depth_scale: float | None
+    far_m: float | None
     normals: bool
     masks: bool
     seed: int

@@ -36,7 +36,7 @@ from synfeal.dataset.world import read_scan_record, write_sequence_from_world
 from synfeal.effects.scene import crowd_of
 from synfeal.errors import InputError, SettingError
 from synfeal.geometry.poses import moved_right
-from synfeal.mesh.checks import shows_one_color
+from synfeal.mesh.checks import color_range, shows_one_color
 from synfeal.mesh.load import is_y_up, load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
@@ -67,10 +67,12 @@ def refuse_invisible(
         shade: Light that shows its shape; a mesh of one colour is refused only without.
     """
     if shade is None and shows_one_color(mesh):
+        rgb = " ".join(f"{level:.0f}" for level in color_range(mesh)[1])
+        found = f" (on reading: {'; '.join(mesh.findings[:2])})" if mesh.findings else ""
         raise InputError(
-            f"{name}: is of one colour, and so would be every image; put its texture files (of an"
-            " OBJ also the .mtl) where it names them, export it with its texture, or give the"
-            " shade headlight, which shows its shape"
+            f"{name}: is of one colour, {rgb} of 255, and so would be every image{found}; put its"
+            " texture files (of an OBJ also the .mtl) where it names them, export it with its"
+            " texture, or give the shade headlight, which shows its shape"
         )
     diagonal_m = float(np.linalg.norm(mesh.bounds_m[1] - mesh.bounds_m[0]))
     if diagonal_m <= camera.near_m:
@@ -104,10 +106,11 @@ def refuse_blank(
         if share > WARN_ABOVE:
             log.warning(
                 "%s: %.0f %% of the pixels of the %s frames will be empty: cameras look through"
-                " holes or past the mesh; %s",
+                " holes, past the mesh, or farther than they see (--far %g); %s",
                 name,
                 100 * share,
                 split,
+                camera.far_m,
                 _way_to_see_more(scene),
             )
 

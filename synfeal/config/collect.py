@@ -34,6 +34,7 @@ from synfeal.config.collection import (
 from synfeal.config.dataset import (
     Backend,
     CameraConfig,
+    DepthUnitsPerM,
     Detail,
     RenderConfig,
     Shade,
@@ -50,6 +51,7 @@ from synfeal.config.types import (
     Fraction,
     Interval,
     NonNegative,
+    Positive,
     Seed,
     Strict,
 )
@@ -230,6 +232,13 @@ class CollectConfig(ViewConfig, PlaceConfig):
     frames: int = Field(ge=1, le=MOST_FRAMES, description="number of training frames")
     test_frames: int = Field(0, ge=0, le=MOST_FRAMES, description="number of test frames")
     depth: bool = Field(False, description="write depth images too")
+    depth_scale: Annotated[DepthUnitsPerM | None, Shown(("UNITS_PER_M",), "1000")] = Field(
+        None,
+        description="stored value of a depth of one metre; 1000 ends at 65.5 m, 100 at 655 m",
+    )
+    far_m: Annotated[Positive | None, Shown(("M",), "100")] = Field(
+        None, description="farthest that cameras see, metres"
+    )
     normals: bool = Field(False, description="write surface normals too (docs/layers.md)")
     masks: bool = Field(False, description="write masks of parts and objects too")
     seed: Seed = Field(0, description="seed of all random numbers")
@@ -298,7 +307,15 @@ class CollectConfig(ViewConfig, PlaceConfig):
 
     @model_validator(mode="after")
     def _build(self) -> Self:
-        self._view = self._camera_of({"stereo_baseline_m": self.stereo_m} if self.stereo_m else {})
+        if self.depth_scale is not None and not self.depth:
+            raise ValueError("depth_scale: is of depth images; give --depth, too")
+        more = {
+            "stereo_baseline_m": self.stereo_m,
+            "depth_units_per_m": self.depth_scale,
+            "far_m": self.far_m,
+        }
+        more = {name: value for name, value in more.items() if value is not None}
+        self._view = self._camera_of(more)
         clearance_m = self.min_clearance_m
         if clearance_m is None:
             clearance_m = self.stereo_m or 0.0  # so that no wall is between the two cameras

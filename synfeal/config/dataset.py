@@ -19,6 +19,8 @@ from synfeal.config.effects import EffectsConfig, refuse_long_exposure
 from synfeal.config.types import Channel, Finite, Positive, Strict
 from synfeal.errors import InputError
 
+# 10 m a unit is no depth any more, and 0.01 mm ends at 0.66 m.
+DepthUnitsPerM = Annotated[float, Field(ge=0.1, le=1e5)]
 StereoBaseline = Annotated[float, Field(ge=1e-4, le=100.0)]
 
 
@@ -30,7 +32,7 @@ class CameraConfig(Strict):
     changes nothing. Panoramas have no intrinsics; they are twice as wide as high.
     """
 
-    unless_none = ("projection", "fisheye_k", "stereo_baseline_m")
+    unless_none = ("projection", "fisheye_k", "stereo_baseline_m", "depth_units_per_m")
 
     calibration: Path | None = Field(
         None,
@@ -64,6 +66,10 @@ class CameraConfig(Strict):
     )
     near_m: Positive = Field(0.05, description="near clip plane")
     far_m: Positive = Field(100.0, description="far clip plane")
+    depth_units_per_m: DepthUnitsPerM | None = Field(
+        None,
+        description="stored value of a depth of one metre; null: 1000, millimetres, up to 65.5 m",
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -146,8 +146,10 @@ def write_manifest(
     if camera.fx is not None:  # which replaced the field of view
         del record["horizontal_fov_deg"]
     along = "optical axis" if camera.projection is None else "ray"
+    units_per_m = camera.depth_units_per_m
+    unit = "millimetres" if units_per_m is None else f"in units of 1/{units_per_m:g} m"
     manifest = {
-        "format": f"7-Scenes; depth along the {along}, millimetres, 65535 invalid",
+        "format": f"7-Scenes; depth along the {along}, {unit}, 65535 invalid",
         "camera": record,
         **_stereo(camera),
         "frames": {

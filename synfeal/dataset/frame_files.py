@@ -19,7 +19,7 @@ import struct
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -192,8 +192,13 @@ LEVEL = 1
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
-def encode_png(pixels: Pixels) -> bytes:
-    """Encode colours (H, W, 3) uint8 or grey values (H, W) uint16 as PNG."""
+def encode_png(pixels: Pixels, text: Mapping[str, str] | None = None) -> bytes:
+    """Encode an image as PNG.
+
+    Args:
+        pixels: Colours (H, W, 3) uint8 or grey values (H, W) uint16.
+        text: Texts by keyword, both of Latin-1; :func:`decode_png` leaves such files to Pillow.
+    """
     is_rgb = pixels.ndim == 3 and pixels.shape[2] == 3 and pixels.dtype == np.uint8
     if not is_rgb and not (pixels.ndim == 2 and pixels.dtype == np.uint16):
         raise ValueError(f"cannot encode pixels {pixels.shape} {pixels.dtype} as PNG")
@@ -201,7 +206,9 @@ def encode_png(pixels: Pixels) -> bytes:
     colors = RGB if is_rgb else GREY
     header = struct.pack(">IIBBBBB", width, height, 8 * pixels.itemsize, colors, 0, 0, 0)
     data = deflate.zlib_compress(_filtered(pixels), LEVEL)
-    chunks = _chunk(b"IHDR", header), _chunk(b"IDAT", data), _chunk(b"IEND", b"")
+    texts = [f"{key}\0{value}".encode("latin-1") for key, value in (text or {}).items()]
+    chunks = [_chunk(b"IHDR", header), *(_chunk(b"tEXt", content) for content in texts)]
+    chunks += [_chunk(b"IDAT", data), _chunk(b"IEND", b"")]
     return SIGNATURE + b"".join(chunks)
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
+from synfeal.dataset.depth import MILLIMETRES
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.render_sequence import effects_of, write_sequence
 from synfeal.effects.scene import SceneRenderer, open_scene
@@ -64,6 +65,7 @@ class Studio:
             on_frame,
             effects_of(self.camera, self.render),
             self.camera.stereo_baseline_m,
+            self.camera.depth_units_per_m or MILLIMETRES,
         )
         return time.perf_counter() - began
 

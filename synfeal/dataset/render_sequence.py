@@ -18,7 +18,12 @@ from PIL import Image
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.config.effects import EffectsConfig
-from synfeal.dataset.depth import INVALID_MM, MILLIMETRES, depth_mm_of, share_beyond_storage
+from synfeal.dataset.depth import (
+    MILLIMETRES,
+    encode_depth,
+    farthest_m,
+    share_beyond_storage,
+)
 from synfeal.dataset.frame_files import encode_png, is_archive, write_archive
 from synfeal.dataset.layer_files import mask_pixels, normal_pixels
 from synfeal.dataset.packed import NetworkView, fit_frame, new_packed
@@ -96,6 +101,7 @@ def render_sequence(
             progress.update,
             effects_of(camera, render),
             camera.stereo_baseline_m,
+            camera.depth_units_per_m or MILLIMETRES,
         )
     progress.part_done(out_frames.name, len(poses), time.perf_counter() - began)
 
@@ -112,6 +118,7 @@ def write_sequence(
     on_frame: Callable[[], object] = lambda: None,
     effects: Effects | None = None,
     stereo_baseline_m: float | None = None,
+    depth_units_per_m: float = MILLIMETRES,
 ) -> None:
     """Render every pose of the table; files are written while the next frames are rendered.
 
@@ -127,6 +134,7 @@ def write_sequence(
         effects: What is added to ideal frames, if anything.
         stereo_baseline_m: Distance to a second camera on the right that is drawn, too; None draws
             none.
+        depth_units_per_m: Stored value of a depth of one metre.
     """
     with _new_sequence(out) as directory, ThreadPoolExecutor(THREADS) as threads:
         waiting: deque[Future[None]] = deque()
@@ -141,46 +149,56 @@ def write_sequence(
             for number, (pose, frame, right) in enumerate(every):
                 stem = directory / f"frame-{number:06d}"
                 if frame.depth_m is not None:
-                    beyond += share_beyond_storage(frame.depth_m)
-                waiting.append(threads.submit(_write_frame, stem, pose, frame, right))
+                    beyond += share_beyond_storage(frame.depth_m, depth_units_per_m)
+                writing = threads.submit(_write_frame, stem, pose, frame, right, depth_units_per_m)
+                waiting.append(writing)
                 while len(waiting) > (MOST_WAITING if number + 1 < len(poses) else 0):
                     waiting.popleft().result()
                     on_frame()
         finally:
             threads.shutdown(cancel_futures=True)
     if beyond:
-        _warn_of_far_depth(out.name, beyond / len(poses))
+        _warn_of_far_depth(out.name, beyond / len(poses), depth_units_per_m)
 
 
-def _warn_of_far_depth(name: str, share: float) -> None:
+def _warn_of_far_depth(name: str, share: float, units_per_m: float) -> None:
     log.warning(
-        "%s: %.2g %% of the pixels show a surface farther than %.1f m, the most that depth in"
-        " millimetres of 16 bits can hold; they have colour, and read as nothing in its depth"
-        " images. Keep the camera nearer (--box), or take their depth from Renderer.render_rgbd",
+        "%s: %.2g %% of the pixels show a surface farther than %.1f m, the most that depth of 16"
+        " bits can hold in units of 1/%g m; they have colour, and read as nothing in its depth"
+        " images. Collect with coarser units (--depth-scale %g), or keep the camera nearer (--box)",
         name,
         100 * share,
-        (INVALID_MM - 1) / MILLIMETRES,
+        farthest_m(units_per_m),
+        units_per_m,
+        units_per_m / 10,
     )
 
 
 def _write_frame(
-    stem: Path, world_from_cam: NDArray[np.float64], frame: Frame, right: Frame | None
+    stem: Path,
+    world_from_cam: NDArray[np.float64],
+    frame: Frame,
+    right: Frame | None,
+    depth_units_per_m: float,
 ) -> None:
     """Write ``<stem>.color.png``, ``.pose.txt``, and the layers of the frame; of a pair both."""
     stem.with_suffix(f".{POSE}").write_bytes(pose_text(world_from_cam).encode())
-    _write_images(stem, frame, COLOR, DEPTH)
+    _write_images(stem, frame, COLOR, DEPTH, depth_units_per_m)
     if frame.normals_cam is not None:
         pixels = normal_pixels(frame.normals_cam)
         stem.with_suffix(f".{NORMAL}").write_bytes(encode_png(pixels))
     if frame.ids is not None:
         stem.with_suffix(f".{MASK}").write_bytes(encode_png(mask_pixels(frame.ids)))
     if right is not None:
-        _write_images(stem, right, RIGHT_COLOR, RIGHT_DEPTH)
+        _write_images(stem, right, RIGHT_COLOR, RIGHT_DEPTH, depth_units_per_m)
 
 
-def _write_images(stem: Path, frame: Frame, color_kind: str, depth_kind: str) -> None:
+def _write_images(
+    stem: Path, frame: Frame, color_kind: str, depth_kind: str, depth_units_per_m: float
+) -> None:
     if frame.depth_m is not None:
-        stem.with_suffix(f".{depth_kind}").write_bytes(encode_png(depth_mm_of(frame.depth_m)))
+        content = encode_depth(frame.depth_m, depth_units_per_m)
+        stem.with_suffix(f".{depth_kind}").write_bytes(content)
     stem.with_suffix(f".{color_kind}").write_bytes(encode_png(frame.rgb))
 
 

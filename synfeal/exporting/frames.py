@@ -6,6 +6,7 @@ An exporter is called with an :class:`ExportSet`, an empty directory to fill, an
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.depth import is_measured, read_depth_units
+from synfeal.dataset.depth import MILLIMETRES, read_depth_m
 from synfeal.dataset.frame_files import FrameFile, encode_png
 from synfeal.dataset.frame_poses import compare_tables, read_poses, rigid_problems
 from synfeal.dataset.images import image_size
@@ -38,6 +39,8 @@ from synfeal.geometry.poses import moved_right
 RIGHT = "-right"
 # Links or copies the image of a frame; without a target it only counts the frame as written.
 Place = Callable[[FrameFile, Path | None], None]
+
+log = logging.getLogger("synfeal")
 
 
 @dataclass(frozen=True)
@@ -162,22 +165,40 @@ def write_lines(path: Path, lines: Iterable[str]) -> None:
     path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
 
 
-def rewrite_depth(source: FrameFile, target: Path, units_per_m: int = 1000) -> float:
+def rewrite_depth(source: FrameFile, target: Path, units_per_m: float = MILLIMETRES) -> float:
     """Write a depth image in other units.
 
     Args:
-        source: 16-bit PNG in millimetres, 0 or 65535 where there is no depth.
+        source: 16-bit PNG in units of its own, 0 or 65535 where there is no depth.
         target: 16-bit PNG to write, 0 where there is no depth or it is beyond 65535 units.
         units_per_m: Units of ``target`` per metre.
 
     Returns:
         Share of the known depths that are beyond 65535 units.
     """
-    depth_mm = read_depth_units(source)
-    known = is_measured(depth_mm)
-    units = np.round(depth_mm.astype(np.float64) * (units_per_m / 1000.0))
+    depth_m = read_depth_m(source)
+    known = np.isfinite(depth_m)
+    units = np.round(depth_m.astype(np.float64) * units_per_m)
     fits = known & (units <= 65535)
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_bytes(encode_png(np.where(fits, units, 0).astype(np.uint16)))
     n_known = int(np.count_nonzero(known))
-    return 1.0 - int(np.count_nonzero(fits)) / max(n_known, 1)
+    return 1.0 - int(np.count_nonzero(fits)) / n_known if n_known else 0.0
+
+
+def warn_of_lost(lost: float, n_frames: int, units_per_m: float, whose: str) -> None:
+    """Say which share of the depths a format cannot hold.
+
+    Args:
+        lost: Sum of what :func:`rewrite_depth` returned.
+        n_frames: Number of frames.
+        units_per_m: Units of the format per metre.
+        whose: Whose images they are.
+    """
+    if lost:
+        log.warning(
+            "%.2g%% of the depths are beyond %.1f m, more than %s images hold: now 0",
+            100 * lost / n_frames,
+            65535 / units_per_m,
+            whose,
+        )

@@ -29,6 +29,7 @@ import pandas as pd
 
 from synfeal.camera.fisheye import EQUIDISTANT
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import MILLIMETRES
 from synfeal.dataset.sequence_listing import DEPTH
 from synfeal.dataset.sevenscenes import pose_text
 from synfeal.errors import InputError
@@ -40,6 +41,7 @@ from synfeal.exporting.frames import (
     need_perspective,
     need_splits,
     rewrite_depth,
+    warn_of_lost,
     write_lines,
 )
 from synfeal.geometry.poses import quat_wxyz_of
@@ -60,7 +62,7 @@ def export_ace(data: ExportSet, out: Path, place: Place) -> None:
         raise InputError(
             f"{data.path}: ACE knows one focal length and no distortion; undistort the images first"
         )
-    matrix = [" ".join(map(repr, row)) for row in camera.matrix().tolist()]
+    matrix, lost = [" ".join(map(repr, row)) for row in camera.matrix().tolist()], 0.0
     for frame in data.frames:
         folder = out / str(frame.split)
         place(frame.color, folder / "rgb" / f"{_stem(frame)}.color.png")
@@ -68,7 +70,8 @@ def export_ace(data: ExportSet, out: Path, place: Place) -> None:
         write_lines(folder / "poses" / f"{_stem(frame)}.pose.txt", pose)
         write_lines(folder / "calibration" / f"{_stem(frame)}.calibration.txt", matrix)
         if data.has_depth:
-            rewrite_depth(frame.depth, folder / "depth" / f"{_stem(frame)}.depth.png")
+            lost += rewrite_depth(frame.depth, folder / "depth" / f"{_stem(frame)}.depth.png")
+    warn_of_lost(lost, len(data.frames), MILLIMETRES, "ACE's")
 
 
 def _stem(frame: ExportFrame) -> str:
@@ -98,20 +101,22 @@ CAM_FROM_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 def export_nerfstudio(data: ExportSet, out: Path, place: Place) -> None:
     """Write ``transforms.json``, ``images/`` and, if there is depth, ``depth/``."""
-    frames = []
+    frames, units_per_m = [], data.camera.depth_units_per_m or MILLIMETRES
     for frame in data.frames:
         world_from_gl = frame.world_from_cam @ CAM_FROM_GL
         entry = {"file_path": _image(frame), "transform_matrix": world_from_gl.tolist()}
         place(frame.color, out / _image(frame))
         if data.has_depth:
             entry["depth_file_path"] = f"depth/{frame.sequence}/{frame.stem}.{DEPTH}"
-            rewrite_depth(frame.depth, out / entry["depth_file_path"])
+            rewrite_depth(frame.depth, out / entry["depth_file_path"], units_per_m)
         frames.append(entry)
     splits = {}
     if data.has_splits:
         train, test = ([_image(frame) for frame in data.of_split(s)] for s in ("train", "test"))
         splits = {"train_filenames": train, "val_filenames": test, "test_filenames": test}
-    write_json(out / "transforms.json", {**_camera(data.camera), **splits, "frames": frames})
+    units = {"depth_unit_scale_factor": 1 / units_per_m} if units_per_m != MILLIMETRES else {}
+    written = {**_camera(data.camera), **units, **splits, "frames": frames}
+    write_json(out / "transforms.json", written)
 
 
 def _image(frame: ExportFrame) -> str:

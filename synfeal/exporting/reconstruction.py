@@ -39,6 +39,7 @@ from synfeal.exporting.frames import (
     need_perspective,
     need_splits,
     rewrite_depth,
+    warn_of_lost,
     write_lines,
 )
 from synfeal.geometry.poses import inverse, quat_wxyz_of
@@ -177,7 +178,6 @@ def _write_binary(folder: Path, data: ExportSet, frames: Iterable[ExportFrame]) 
 
 FRAMES_PER_S = 30.0
 UNITS_PER_M = 5000
-MOST_M = 65535 / UNITS_PER_M
 
 Lists = dict[str, list[str]]
 
@@ -204,12 +204,7 @@ def export_tum(data: ExportSet, out: Path, place: Place) -> None:
     if data.has_splits:
         for name in SPLIT_FILES.values():
             shutil.copyfile(data.path / name, out / name)
-    if lost:
-        log.warning(
-            "%.2f%% of the depths are beyond %.1f m, more than TUM's images hold: now 0",
-            100 * lost / len(data.frames),
-            MOST_M,
-        )
+    warn_of_lost(lost, len(data.frames), UNITS_PER_M, "TUM's")
 
 
 def _write_lists(directory: Path, lists: Lists, camera: CameraConfig) -> None:

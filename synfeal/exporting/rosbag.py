@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from synfeal.dataset.depth import is_measured, read_depth_units
+from synfeal.dataset.depth import MILLIMETRES, read_depth_m
 from synfeal.dataset.images import read_rgb
 from synfeal.dataset.sevenscenes import SPLIT_FILES
 from synfeal.errors import InputError
@@ -85,11 +85,19 @@ def _messages(data: ExportSet, store: Typestore, frame: ExportFrame, time_ns: in
     yield f"{COLOR}/image_raw", _image(store, optical, read_rgb(frame.color), "rgb8")
     yield f"{COLOR}/camera_info", info
     if data.has_depth:
-        depth_mm = read_depth_units(frame.depth)
-        known_mm = np.where(is_measured(depth_mm), depth_mm, np.uint16(0))
-        yield f"{DEPTH}/image_raw", _image(store, optical, known_mm, "16UC1")
+        yield f"{DEPTH}/image_raw", _depth_image(data, store, optical, frame)
         yield f"{DEPTH}/camera_info", info
     yield from _poses(store, frame, in_world)
+
+
+def _depth_image(data: ExportSet, store: Typestore, header: Any, frame: ExportFrame) -> Any:
+    """Build the depth image of a frame: millimetres, or metres where those would not hold it."""
+    if data.camera.depth_units_per_m is not None:
+        depth_m = read_depth_m(frame.depth, nothing=np.nan)
+        return _image(store, header, depth_m, "32FC1")
+    depth_m = read_depth_m(frame.depth, nothing=0.0)
+    depth_mm = np.round(depth_m * np.float32(MILLIMETRES)).astype(np.uint16)
+    return _image(store, header, depth_mm, "16UC1")
 
 
 def _image(store: Typestore, header: Any, pixels: np.ndarray, encoding: str) -> Any:

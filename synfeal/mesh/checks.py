@@ -61,8 +61,13 @@ def check_indices(part: MeshPart, path: Path) -> None:
 
 def shows_one_color(mesh: TexturedMesh) -> bool:
     """Check whether every image of the mesh would be of one colour, whatever textures it has."""
+    return bool(np.ptp(color_range(mesh), axis=0).max() <= LEVELS)
+
+
+def color_range(mesh: TexturedMesh) -> NDArray[np.float64]:
+    """Return the least and the greatest value (2, 3) of each channel that a mesh shows."""
     colors = np.concatenate([_extreme_colors(part) for part in mesh.parts])
-    return bool(np.ptp(colors, axis=0).max() <= LEVELS)
+    return np.stack([colors.min(axis=0), colors.max(axis=0)])
 
 
 def _extreme_colors(part: MeshPart) -> NDArray[np.float64]:

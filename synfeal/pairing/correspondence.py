@@ -1,7 +1,7 @@
 """Correspondences: places in one frame of points that another shows, and their visibility.
 
 A point is *visible* in a frame if it projects into the image and its depth there is that of the
-depth image, up to a relative tolerance (and 2 mm, for depth is stored in millimetres). It is
+depth image, up to a relative tolerance (and two of the units that depth is stored in: 2 mm). It is
 *hidden* if it projects into the image and is not visible: behind something, or where the other
 frame has no depth. It is *outside* if it does not project into the image.
 
@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from synfeal.camera.projection import depth_of_points, is_shown, pixels_of_points, rays_of_pixels
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.depth import MILLIMETRES
 from synfeal.geometry.poses import inverse
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 0.01  # of depth, relative
-ROUNDING_M = 0.002
+ROUNDING_UNITS = 2.0  # of stored depth
 # Second difference of inverse depth, relative, from which three pixels are on no plane.
 BENT = 0.01
 # Difference of inverse depth, relative, from which neighbours are parted by an edge, not a crease.
@@ -166,7 +167,8 @@ def look_for(
     inside = known & is_shown(camera, pixel)
     state = np.where(known, State.OUTSIDE, State.NO_DEPTH).astype(np.uint8)
     expected_m = depth_of_points(camera, in_cam[inside])
-    slack_m = np.maximum(ROUNDING_M, tolerance * expected_m)
+    unit_m = 1.0 / (camera.depth_units_per_m or MILLIMETRES)
+    slack_m = np.maximum(ROUNDING_UNITS * unit_m, tolerance * expected_m)
     is_visible = depth.shows(pixel[inside], expected_m, slack_m)
     state[inside] = np.where(is_visible, State.VISIBLE, State.HIDDEN)
     return ProjectedPoints(pixel, state)

@@ -283,7 +283,8 @@ def _of_manifest(sequence: Path) -> RgbdCamera | None:
         values = read_json(path)
         camera = CameraConfig.model_validate(values.get("camera", values))
     _refuse_wide(camera, str(path))
-    return RgbdCamera(camera, camera, np.eye(4), MILLIMETRES, MANIFEST)
+    units_per_m = camera.depth_units_per_m or MILLIMETRES
+    return RgbdCamera(camera, camera, np.eye(4), units_per_m, MANIFEST)
 
 
 def _check_size(sequence: Path, camera: CameraConfig, size: tuple[int, int], kind: str) -> None:

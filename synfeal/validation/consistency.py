@@ -18,7 +18,7 @@ from scipy.ndimage import map_coordinates
 
 from synfeal.camera.projection import horizontal_fov_rad, normalised_of_pixels, pixels_of_normalised
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.depth import read_depth_m
+from synfeal.dataset.depth import MILLIMETRES, read_depth_m
 from synfeal.dataset.frame_poses import Poses
 from synfeal.dataset.images import read_rgb
 from synfeal.dataset.known_camera import KnownCamera
@@ -200,7 +200,8 @@ def _view(
         return None
     if camera.of_depth is not None:
         grey = _registered(grey, camera.config, camera.of_depth)
-    return ComparedFrame(world_from_cam, depth_m, grey)
+    unit_m = 1.0 / (camera.depth.depth_units_per_m or MILLIMETRES)
+    return ComparedFrame(world_from_cam, depth_m, grey, unit_m)
 
 
 def _registered(
@@ -237,7 +238,8 @@ def _overlap_check(pairs: list[Pair], poses: Poses, camera: CameraConfig) -> Che
     elif 2 * len(hidden) > len(seen):
         failures = (
             f"{hidden[0].a.path(DEPTH)}: all of it is hidden in frame {hidden[0].b.number}, and so"
-            f" it is in {len(hidden) - 1} others of {len(seen)} pairs; is depth in millimetres?",
+            f" it is in {len(hidden) - 1} others of {len(seen)} pairs; is depth in the units"
+            " that the manifest says (millimetres, or camera.depth_units_per_m)?",
         )
     return Check("pairs", text, failures)
 

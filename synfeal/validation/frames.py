@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.depth import DepthUnits, is_measured, read_depth_units
+from synfeal.dataset.depth import MILLIMETRES, own_units_per_m, read_depth_m
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.images import LOOKED_AT, is_of_one_color, read_rgb
 from synfeal.dataset.sequence_listing import (
@@ -67,14 +67,16 @@ def check_images(
     read_color = partial(read_rgb, formats=PNG)
     readers: dict[str, Callable[[FrameFile], Pixels]] = {
         COLOR: read_color,
-        DEPTH: read_depth_units,
+        DEPTH: read_depth_m,
         RIGHT_COLOR: read_color,
-        RIGHT_DEPTH: read_depth_units,
+        RIGHT_DEPTH: read_depth_m,
     }
     failures: list[str] = []
     blank: dict[str, list[Frame]] = {what: [] for what in MOST}
     n_frames = n_images = 0
     for sequence in sequences:
+        if camera and DEPTH in sequence.numbers and sequence.numbers[DEPTH]:
+            failures += _other_units(sequence, camera)
         for frame in sequence.frames:
             images: dict[str, Pixels] = {}
             for kind, read in readers.items():
@@ -110,11 +112,27 @@ def check_images(
     return [Check("images", text, tuple(failures)), _content(n_frames, blank)]
 
 
-def _median_m(depth_mm: DepthUnits) -> float:
+def _other_units(sequence: SequenceListing, camera: CameraConfig) -> list[str]:
+    """Compare the units that the first depth image of a sequence says with those of the camera."""
+    file = sequence.frames[0].path(DEPTH)
+    try:
+        said = own_units_per_m(file) or MILLIMETRES
+    except InputError:
+        return []  # reading it says what is wrong
+    expected = camera.depth_units_per_m or MILLIMETRES
+    if said == expected:
+        return []
+    return [
+        f"{file}: says that a metre is stored as {said:g}, the manifest"
+        f" (camera.depth_units_per_m) {expected:g}; collect the data set again"
+    ]
+
+
+def _median_m(depth_m: Pixels) -> float:
     """Return the median of the known depths, metres; infinite where there are none."""
-    depth_mm = depth_mm[::LOOKED_AT, ::LOOKED_AT]
-    known = depth_mm[is_measured(depth_mm)]
-    return float(np.median(known)) / 1000.0 if known.size else math.inf
+    depth_m = depth_m[::LOOKED_AT, ::LOOKED_AT]
+    known = depth_m[np.isfinite(depth_m)]
+    return float(np.median(known)) if known.size else math.inf
 
 
 def _content(n_frames: int, blank: Mapping[str, list[Frame]]) -> Check:
@@ -130,8 +148,8 @@ def _content(n_frames: int, blank: Mapping[str, list[Frame]]) -> Check:
     return Check("content", f"of {n_frames} frames {', '.join(said)}", tuple(failures))
 
 
-def _is_mostly_empty(rgb: Pixels, depth_mm: DepthUnits | None) -> bool:
+def _is_mostly_empty(rgb: Pixels, depth_m: Pixels | None) -> bool:
     """Tell whether most of an image shows nothing; without depth, black counts as empty."""
     black = (rgb[::LOOKED_AT, ::LOOKED_AT] == 0).all(axis=2)
-    empty = black if depth_mm is None else ~is_measured(depth_mm)
+    empty = black if depth_m is None else ~np.isfinite(depth_m)
     return bool(np.mean(empty) > 0.5)

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 BEND = 0.05  # 1/z bends by less, of itself, from pixel to pixel on one surface; planes do not bend
 OCCLUSION_RATIO = 1.05  # a point more than 5 % behind the surface is hidden by it
 MIN_PIXELS = 100
-ROUNDING_M = 0.0005  # of depth stored in millimetres
+ROUNDING = 0.5  # of stored depth, in its units
 POSE_ROUNDING = 1e-10  # of positions stored with eleven digits, of both frames
 GREY_NOISE = 5.0  # of rendered frames, as resampled here: grey levels
 MAX_SHIFT_ERROR_PX = 0.05
@@ -40,6 +40,7 @@ class ComparedFrame:
     world_from_cam: Array  # (4, 4)
     depth_m: NDArray[Any]  # (H, W), inf where there is none
     grey: NDArray[Any]  # (H, W), 0 to 255
+    unit_m: float = 0.001  # in which depth is stored
 
     @cached_property
     def inverse_depth(self) -> NDArray[Any]:
@@ -134,7 +135,8 @@ def _look(a: ComparedFrame, b: ComparedFrame, lens: Lens) -> _Reprojected:
         seen[magnified <= 0.0] = np.nan
         v00, v01, v10, v11 = _corners(b.inverse_depth, corner)
         off_plane = seen**2 * np.abs(v00 + v11 - v01 - v10) / 2.0
-    tolerance = ROUNDING_M * (1.0 + np.abs(magnified)) + off_plane + lens.curvature * seen
+    rounding_m = ROUNDING * max(a.unit_m, b.unit_m)
+    tolerance = rounding_m * (1.0 + np.abs(magnified)) + off_plane + lens.curvature * seen
     tolerance += POSE_ROUNDING * max(np.abs(v.world_from_cam[:3, 3]).max() for v in (a, b))
     grey, gradient = _interpolate(b.grey, corner, fraction)
     return _Reprojected(mask, lens.depth_of(points), seen, tolerance, grey, gradient)

@@ -29,7 +29,7 @@ from reproduction.statistics.limits import combine, read_metrics
 from reproduction.tables.assistance import assistance_record
 from synfeal.camera.calibration import read_calibration
 from synfeal.config.dataset import CameraConfig, RenderConfig
-from synfeal.dataset.depth import read_depth_units
+from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.images import read_rgb
 from synfeal.dataset.known_camera import camera_of_dataset
 from synfeal.dataset.packed import pack_frames, read_packed
@@ -211,7 +211,7 @@ KINDS = (
          elsewhere(lambda p, out: batches.link_images([p], CAMERA, out / "images"))),
     Kind("colour image, odometry", COLOR, write_color,
          lambda p: batches.read_image(p, CAMERA, "RGB"), lambda rgb: rgb.shape == (18, 24, 3)),
-    Kind("depth image", DEPTH, write_depth, read_depth_units, lambda mm: mm.dtype == np.uint16),
+    Kind("depth image", DEPTH, write_depth, read_depth_m, lambda m: m.dtype == np.float32),
     Kind("packed frames", "train.npy", write_packed, read_packed, is_packed, n_flips=60),
     Kind("packed frames, training", "train.npy", write_packed, lambda p: read_images(p, N, 8, CPU)),
     Kind("record of packed frames", "seq-01.json", write_record, elsewhere(recorded),

@@ -5,7 +5,7 @@ import numpy as np
 from PIL import Image
 
 from synfeal.config.dataset import CameraConfig
-from synfeal.dataset.depth import depth_mm_of
+from synfeal.dataset.depth import encode_depth
 from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.sevenscenes import pose_text
 from synfeal.geometry.poses import pose_matrix
@@ -49,7 +49,7 @@ def write_frames(folder, paint, poses, camera=FRAME, depth_camera=None, depth_fr
         image = np.asarray(painted(paint, pose, SIZE_M, camera))
         stem.with_suffix(".color.png").write_bytes(encode_png(image))
         depth_m = cast(pose @ beside, ROOM, depth_camera or camera)[0]
-        stem.with_suffix(".depth.png").write_bytes(encode_png(depth_mm_of(depth_m)))
+        stem.with_suffix(".depth.png").write_bytes(encode_depth(depth_m))
         stem.with_suffix(".pose.txt").write_text(pose_text(pose))
 
 

@@ -15,7 +15,7 @@ from synfeal.collection.prepare import prepare_scene
 from synfeal.config.collection import SceneConfig
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset import sevenscenes
-from synfeal.dataset.depth import depth_mm_of, read_depth_m
+from synfeal.dataset.depth import encode_depth, read_depth_m
 from synfeal.dataset.finish import write_manifest
 from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
@@ -86,7 +86,7 @@ def test_split_files_are_those_of_7_scenes(tmp_path):
 
 def test_depth_is_16_bit_millimetres_and_a_pose_four_exact_rows(tmp_path):
     depth = np.array([[0.5, 1.2344, np.inf], [65.534, 65.536, 100.0]], np.float32)
-    (tmp_path / "depth.png").write_bytes(encode_png(depth_mm_of(depth)))
+    (tmp_path / "depth.png").write_bytes(encode_depth(depth))
     stored = np.asarray(Image.open(tmp_path / "depth.png"))
     assert stored.tolist() == [[500, 1234, 65535], [65534, 65535, 65535]]
     back = read_depth_m(tmp_path / "depth.png")
