@@ -106,7 +106,7 @@ def refuse_blank(
         if share > WARN_ABOVE:
             log.warning(
                 "%s: %.0f %% of the pixels of the %s frames will be empty: cameras look through"
-                " holes, past the mesh, or farther than they see (--far %g); %s",
+                " holes, past the mesh, or farther than they see (`far_m=%g`); %s",
                 name,
                 100 * share,
                 split,

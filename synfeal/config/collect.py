@@ -308,7 +308,7 @@ class CollectConfig(ViewConfig, PlaceConfig):
     @model_validator(mode="after")
     def _build(self) -> Self:
         if self.depth_scale is not None and not self.depth:
-            raise ValueError("depth_scale: is of depth images; give --depth, too")
+            raise ValueError("depth_scale: is of depth images; give `depth=True`, too")
         more = {
             "stereo_baseline_m": self.stereo_m,
             "depth_units_per_m": self.depth_scale,

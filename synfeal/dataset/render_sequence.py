@@ -165,7 +165,7 @@ def _warn_of_far_depth(name: str, share: float, units_per_m: float) -> None:
     log.warning(
         "%s: %.2g %% of the pixels show a surface farther than %.1f m, the most that depth of 16"
         " bits can hold in units of 1/%g m; they have colour, and read as nothing in its depth"
-        " images. Collect with coarser units (--depth-scale %g), or keep the camera nearer (--box)",
+        " images. Collect with coarser units (`depth_scale=%g`), or keep the camera nearer (`box`)",
         name,
         100 * share,
         farthest_m(units_per_m),
