@@ -102,7 +102,7 @@ def _unit_advice(extents_m: Array, unit_m: float) -> str:
     if extents_m.max() > EXTENTS_M[1]:
         return (
             "in no usual unit is that a room. If it is terrain or a town, all is well, but for"
-            " depth, which is stored up to 65.5 m unless collect gets a `depth_scale`; else remove"
+            " depth, which is stored up to 65.5 m unless collect gets --depth-scale; else remove"
             " what lies far away from the rest"
         )
     return "in no usual unit is that a room; measure it, and give --unit-m"
