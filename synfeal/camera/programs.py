@@ -153,14 +153,15 @@ def _of_orbslam(values: Values, prefix: str) -> Values:
         raise ValueError(f"Camera.type: '{kind[:40]}' is not read; {UNDISTORT}")
     lens = ORBSLAM_LENS[kind.lower()]
     names = ("k1", "k2", "k3", "k4") if lens == FISHEYE else ("k1", "k2", "p1", "p2", "k3")
-    sides = [values.get(f"Camera.{side}") for side in ("width", "height")]
-    if None in sides:
+    width, height = (values.get(f"Camera.{side}") for side in ("width", "height"))
+    if width is None or height is None:
         raise ValueError(
             "Camera.width: missing, as in the files of ORB-SLAM 2; add Camera.width and"
             " Camera.height, the size of the images in pixels"
         )
     pinhole = [values.get(f"{prefix}{name}") for name in ("fx", "fy", "cx", "cy")]
-    return _opencv(*sides, pinhole, lens, [values.get(f"{prefix}{name}", 0.0) for name in names])
+    coefficients = [values.get(f"{prefix}{name}", 0.0) for name in names]
+    return _opencv(width, height, pinhole, lens, coefficients)
 
 
 def _of_open3d(values: Values) -> Values:

@@ -102,9 +102,9 @@ def test_a_photograph_that_exif_turns_is_found_with_the_calibration_of_the_senso
     place, tmp_path, capsys
 ):
     """Held upright or upside down, the sensor stores what it sees; the pose is of the upright."""
-    truth, half = looking_about(3, 2), np.diag([-1.0, -1.0, 1.0, 1.0])
-    quarter = pose_matrix(rotation_from_rpy([0.0, 0.0, -np.pi / 2]), np.zeros(3))
-    held = [truth[0] @ np.linalg.inv(quarter), truth[1] @ half, truth[2]]
+    truth, half, quarter = looking_about(3, 2), np.diag([-1.0, -1.0, 1.0, 1.0]), np.eye(4)
+    quarter[:2, :2] = [[0, -1], [1, 0]]  # the stored x is down in the upright photograph
+    held = [truth[0] @ quarter, truth[1] @ half, truth[2]]
     write_photographs(tmp_path / "photos", textures(0), held)
     for number, orientation in enumerate((6, 3, 1)):
         exif = Image.Exif()

@@ -94,7 +94,10 @@ def test_validate_finds_nothing_wrong_and_a_wrong_unit_at_once(far, tmp_path, ca
 
 
 def test_what_is_exported_is_as_far_away(far, tmp_path, caplog):
-    assert main(["export", str(far), "--to", "nerfstudio", "--out", str(tmp_path / "nerf")]) == 0
+    assert (
+        main(["export", str(far), "--to", "nerfstudio", "--copy", "--out", str(tmp_path / "nerf")])
+        == 0
+    )
     frame = read_capture(tmp_path / "nerf").frames[3]
     agree(frame.read_depth_m(), far, 3)
     assert "beyond" not in caplog.text
@@ -121,7 +124,7 @@ def test_depth_in_millimetres_counts_what_it_loses_and_names_the_remedy(hall, tm
     assert collect(hall, tmp_path / "set", "--depth", "--far", "300") == 0
     warnings = [record.getMessage() for record in caplog.records if "65.5 m" in record.message]
     assert warnings
-    assert "--depth-scale 100" in warnings[0]
+    assert "`depth_scale=100`" in warnings[0]
 
 
 def test_a_scale_without_depth_is_refused(hall, tmp_path, capfd):
