@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from baselines.config.learning import ModelName
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.config.photometric import PhotometricConfig
-from synfeal.errors import InputError, SettingError
+from synfeal.errors import Argument, InputError
 
 if TYPE_CHECKING:
     from baselines.references.localized import LocalizedInMap
@@ -75,7 +75,9 @@ def train(
     from baselines.training.train import train as learn
 
     if images is not None and minutes is not None:
-        raise SettingError("minutes", "images say how long already; give one of the two")
+        raise InputError(
+            Argument("minutes"), "`images` say how long already", "give one of the two"
+        )
     _check_seed(seed)
     default = None if minutes is not None else DEFAULT_IMAGES
     job = TrainJob(
@@ -234,14 +236,14 @@ def _photographs(camera: AnyPath | None, focal_px: float | None, exif: bool) -> 
 
 def _check_seed(seed: int) -> None:
     if not 0 <= seed <= MOST_SEED:
-        raise SettingError("seed", f"must be 0 to 2^63 - 1, found {seed}")
+        raise InputError(Argument("seed"), f"must be 0 to 2^63 - 1, found {seed}")
 
 
 def _refuse(model: Path, reason: str, **settings: object) -> None:
     """Refuse settings that would have no effect."""
     for name, value in settings.items():
         if value is not None:
-            raise SettingError(name, f"{reason}, such as {model}; leave it out")
+            raise InputError(Argument(name), f"{reason}, such as {model}", "leave it out")
 
 
 def _randomisation(ranges: AnyPath | PhotometricConfig) -> PhotometricConfig | None:
@@ -262,4 +264,4 @@ def _randomisation(ranges: AnyPath | PhotometricConfig) -> PhotometricConfig | N
     try:
         return PhotometricConfig.model_validate(read_yaml(path))
     except ValidationError as error:
-        raise InputError(f"{path}: {describe(error)}") from error
+        raise InputError(path, describe(error)) from error

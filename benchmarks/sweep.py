@@ -99,9 +99,9 @@ def read_sweep(path: Path) -> Sweep:
     try:
         sweep = Sweep.model_validate(read_yaml(path))
     except ValidationError as error:
-        raise InputError(f"{path}: {describe(error)}") from error
+        raise InputError(path, describe(error)) from error
     if sweep.measure not in MEASURES:
-        raise InputError(f"{path}: measure: '{sweep.measure}' must be one of {', '.join(MEASURES)}")
+        raise InputError(path, f"measure: '{sweep.measure}' must be one of {', '.join(MEASURES)}")
     return sweep
 
 
@@ -149,7 +149,7 @@ def _run(
         case = model.model_validate(_filled(raw, str(results)))
     except ValidationError as error:
         where = ", ".join(f"{name} {value}" for name, value in key.items())
-        raise InputError(f"{sweep.title} ({where}): {describe(error)}") from error
+        raise InputError(f"{sweep.title} ({where})", describe(error)) from error
     return SweepRun(key, case, hashlib.sha256(settings.encode()).hexdigest()[:12])
 
 
@@ -177,7 +177,7 @@ def read_table(path: Path, keys: Sequence[str]) -> pd.DataFrame:
     names = [*keys, SETTINGS]
     table = read_rows(path, names)
     if list(table.columns[: len(names)]) != names:
-        raise InputError(f"{path}: must begin with the columns {', '.join(names)}; move it away")
+        raise InputError(path, f"must begin with the columns {', '.join(names)}", "move it away")
     return table
 
 
@@ -203,7 +203,7 @@ def run_missing(measure: str, runs: Sequence[SweepRun], table: Path, jobs: int) 
     for run in runs:
         if done.get(_key(run.key, keys), run.settings) != run.settings:
             where = ", ".join(f"{name} {value}" for name, value in run.key.items())
-            raise InputError(f"{table}: the row of {where} was made with other settings; remove it")
+            raise InputError(table, f"the row of {where} was made with other settings", "remove it")
     missing = [run for run in runs if _key(run.key, keys) not in done]
     _measure(measure, missing, table, keys, jobs)
     rows = read_table(table, keys).set_index(keys, drop=False)

@@ -16,15 +16,11 @@ from typing import TypedDict
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
-from synfeal.dataset.images import read_image
-from synfeal.dataset.sequence_listing import COLOR
-from synfeal.pairing.correspondence import State
-from synfeal.pairing.flow import flow_between
-from synfeal.pairing.frames import DepthFrames, read_depth_frames
-from synfeal.pairing.run import read_pairs
+import synfeal
 
 
 class Pair(TypedDict):
@@ -43,11 +39,14 @@ class MatchingPairs(Dataset[Pair]):
 
     def __init__(self, dataset: Path, pairs: Path, n_points: int = 512, seed: int = 0) -> None:
         """Read the table and the poses; images are read when a pair is asked for."""
-        self._table = read_pairs(pairs)
-        self._frames: DepthFrames = read_depth_frames(
-            dataset, splits=("train", "test"), camera_file=None, every=1
-        )
-        self._index = {self._frames.image(index): index for index in range(len(self._frames))}
+        self._table = synfeal.read_pairs(pairs)
+        data = synfeal.open_dataset(dataset)
+        self._camera = data.camera
+        self._frames = {
+            f"{file.parent.name}/{file.name}": (split, row)
+            for split in (data.train, data.test)
+            for row, file in enumerate(split.images)
+        }
         self._n_points, self._seed = n_points, seed
 
     def __len__(self) -> int:
@@ -56,33 +55,35 @@ class MatchingPairs(Dataset[Pair]):
 
     def __getitem__(self, row: int) -> Pair:
         """Load a pair; the same row gives the same points."""
-        a, b = (self._index[self._table[f"image_{end}"][row]] for end in "ab")
-        flow = flow_between(
-            camera=self._frames.camera,
-            depth_a_m=self._frames.depth_m(a),
-            world_from_a=self._frames.world_from_cam[a],
-            depth_b_m=self._frames.depth_m(b),
-            world_from_b=self._frames.world_from_cam[b],
+        split_a, a = self._frames[self._table["image_a"][row]]
+        split_b, b = self._frames[self._table["image_b"][row]]
+        flow = synfeal.flow_between(
+            camera=self._camera,
+            depth_a_m=split_a.depth_m(a),
+            world_from_a=split_a.world_from_cam[a],
+            depth_b_m=split_b.depth_m(b),
+            world_from_b=split_b.world_from_cam[b],
         )
         rng = np.random.default_rng((self._seed, row))
-        height, width = flow.state.shape
+        height, width = flow.is_visible.shape
         lines = rng.integers(0, height, self._n_points)
         columns = rng.integers(0, width, self._n_points)
         points_a = np.stack([columns, lines], axis=-1) + np.float32(0.5)
-        visible = flow.state[lines, columns] == State.VISIBLE
+        visible = flow.is_visible[lines, columns]
         points_b = points_a + np.where(visible[:, None], flow.flow_px[lines, columns], 0.0)
         return Pair(
-            image_a=self._image(a),
-            image_b=self._image(b),
+            image_a=channels_first(split_a.rgb(a)),
+            image_b=channels_first(split_b.rgb(b)),
             points_a=torch.from_numpy(points_a.astype(np.float32)),
             points_b=torch.from_numpy(points_b.astype(np.float32)),
             visible=torch.from_numpy(visible),
             overlap=torch.tensor(self._table["overlap_ab"][row], dtype=torch.float32),
         )
 
-    def _image(self, index: int) -> Tensor:
-        rgb = np.array(read_image(self._frames.frames[index].path(COLOR), "RGB"))
-        return torch.from_numpy(rgb).permute(2, 0, 1).float() / 255.0
+
+def channels_first(rgb: NDArray[np.uint8]) -> Tensor:
+    """Turn an image (H, W, 3), 0 to 255, into one (3, H, W), 0 to 1."""
+    return torch.from_numpy(rgb).permute(2, 0, 1).float() / 255.0
 
 
 def sample(image: Tensor, points: Tensor) -> Tensor:

@@ -40,8 +40,11 @@ if TYPE_CHECKING:
         plan,
         preview,
         scan,
+        unpack,
         validate,
     )
+    from synfeal.pairing.flow import flow_between, read_flows
+    from synfeal.pairing.run import read_pairs
 
 __version__ = "0.1.0"
 __all__ = [
@@ -51,21 +54,31 @@ __all__ = [
     "evaluate",
     "export",
     "find_pairs",
+    "flow_between",
     "inspect",
     "load_mesh",
     "open_dataset",
     "pairs",
     "plan",
     "preview",
+    "read_flows",
+    "read_pairs",
     "scan",
+    "unpack",
     "validate",
 ]
+# Modules of what is not in synfeal.api.
+ELSEWHERE = {
+    "flow_between": "synfeal.pairing.flow",
+    "read_flows": "synfeal.pairing.flow",
+    "read_pairs": "synfeal.pairing.run",
+}
 
 
 def __getattr__(name: str) -> Any:
-    """Load a function of :mod:`synfeal.api`, or of an installed package, when it is asked for."""
+    """Load a name when it is asked for; names of installed packages, too."""
     if name in __all__:
-        return getattr(import_module("synfeal.api"), name)
+        return getattr(import_module(ELSEWHERE.get(name, "synfeal.api")), name)
     if not name.startswith("_"):
         for command in import_module("synfeal.cli").added_commands():
             if command.name == name and command.function is not None:

@@ -19,13 +19,15 @@ from synfeal.camera.projection import Projection
 from synfeal.collection.run import collect as run_collection
 from synfeal.collection.run import plan_training
 from synfeal.collection.settings import collect_config
-from synfeal.config.collect import PlaceConfig, ViewConfig, checked
+from synfeal.config.collect import CollectConfig, LikeConfig, PlaceConfig, ViewConfig, checked
 from synfeal.config.collection import ClutterConfig, Mode, UpAxis
 from synfeal.config.dataset import Backend, CameraConfig, Detail, Shade
+from synfeal.config.described import with_options
 from synfeal.config.effects import EffectsConfig
 from synfeal.config.renamed import renamed, warn_renamed
 from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import FrameFile
+from synfeal.dataset.images import read_rgb
 from synfeal.dataset.known_camera import camera_of_dataset
 from synfeal.dataset.layer_files import read_instances, read_mask, read_normals
 from synfeal.dataset.pose_table import PoseTable
@@ -38,7 +40,7 @@ from synfeal.dataset.sequence_listing import (
     RIGHT_DEPTH,
 )
 from synfeal.dataset.split_frames import SplitFrames, read_split_frames
-from synfeal.errors import InputError, SettingError, read_as
+from synfeal.errors import Argument, InputError, read_as
 from synfeal.geometry.limits import FARTHEST_M
 from synfeal.geometry.poses import moved_right
 from synfeal.geometry.rigid import refuse_non_rigid
@@ -55,6 +57,7 @@ from synfeal.render.surface import Normals, SurfaceImage, SurfaceTable
 if TYPE_CHECKING:
     import pandas as pd
 
+    from synfeal.captures.unpack import Unpacked
     from synfeal.dataset.poses_in import FormatName
     from synfeal.evaluation.run import Evaluation
     from synfeal.geometry.axes import PosesAre
@@ -133,6 +136,39 @@ class CollectOptions(ViewOptions, total=False):
     angle_margin_deg: float | None
 
 
+def unpack(
+    capture: AnyPath,
+    out: AnyPath,
+    *,
+    format: str | None = None,  # noqa: A002 (the word of the command)
+    stride: int = 1,
+) -> Unpacked:
+    """Turn a capture of a phone, a sensor or another program into a posed sequence.
+
+    Args:
+        capture: Folder or file of a capture, in any of the formats of ``docs/captures.md``.
+        out: Folder to create.
+        format: Format of the capture, where its files fit several; None to find it from them.
+        stride: Take every such frame.
+
+    Returns:
+        The sequence, which :func:`scan`, ``map`` and ``collect(like=...)`` read, and what was left
+        out of it.
+
+    Raises:
+        InputError: The capture cannot be read, or ``out`` is not empty.
+    """
+    from synfeal.captures.formats import read_capture
+    from synfeal.captures.unpack import unpack as write
+    from synfeal.records.progress import Progress
+
+    if stride < 1:
+        raise InputError(Argument("stride"), f"must be at least 1, found {stride}")
+    read = read_capture(Path(capture), format)
+    with Progress(-(-len(read) // stride), "unpacked") as progress:
+        return write(read, Path(out), stride=stride, on_frame=progress.update)
+
+
 def load_mesh(path: AnyPath, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> TexturedMesh:
     """Load a textured mesh into the world frame: z up, metres.
 
@@ -148,6 +184,7 @@ def load_mesh(path: AnyPath, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> T
 class Renderer:
     """Renderer of unlit images of a mesh; a context manager."""
 
+    @with_options(ViewOptions, ViewConfig)
     @renamed(**EARLIER)
     def __init__(self, mesh: TexturedMesh, **options: Unpack[ViewOptions]) -> None:
         """Open a renderer.
@@ -211,13 +248,16 @@ def _rigid(world_from_cam: ArrayLike) -> NDArray[np.float64]:
     with read_as("world_from_cam", "a pose", ValueError, TypeError):
         pose = np.asarray(world_from_cam, np.float64)
     if pose.shape != (4, 4):
-        raise InputError(f"world_from_cam: must be of shape (4, 4), found {pose.shape}")
+        raise InputError(Argument("world_from_cam"), f"must be of shape (4, 4), found {pose.shape}")
     if not (np.abs(pose) <= FARTHEST_M).all():  # of NaN as well
-        raise InputError("world_from_cam: must hold finite numbers, its position in metres")
+        raise InputError(
+            Argument("world_from_cam"), "must hold finite numbers, its position in metres"
+        )
     refuse_non_rigid(pose, "world_from_cam")
     return pose
 
 
+@with_options(CollectOptions, CollectConfig, LikeConfig)
 @renamed(**EARLIER)
 def plan(mesh: AnyPath, frames: int, **options: Unpack[CollectOptions]) -> PoseTable:
     """Return the training poses that :func:`collect` would use with the same options.
@@ -230,6 +270,7 @@ def plan(mesh: AnyPath, frames: int, **options: Unpack[CollectOptions]) -> PoseT
     return plan_training(collect_config({"mesh": mesh, "frames": frames, **options})[0])
 
 
+@with_options(CollectOptions, CollectConfig, LikeConfig)
 @renamed(**EARLIER)
 def collect(
     mesh: AnyPath, out: AnyPath, frames: int, *, cores: int = 1, **options: Unpack[CollectOptions]
@@ -300,6 +341,10 @@ class Split:
         """Return camera poses (N, 4, 4)."""
         return self.poses.world_from_cam
 
+    def rgb(self, row: int) -> Rgb:
+        """Read the colours (H, W, 3), uint8, of a frame."""
+        return read_rgb(self.images[row])
+
     def depth_m(self, row: int) -> Depth:
         """Read depth (H, W) of a frame in metres, infinite where there is none."""
         return read_depth_m(_file_at(self.depths, row, "depth"))
@@ -315,7 +360,7 @@ class Split:
 
 def _file_at(files: tuple[FrameFile, ...], row: int, what: str) -> FrameFile:
     if not files:
-        raise InputError(f"{what}: the data set has none; collect it with --{what}")
+        raise InputError(what, "the data set has none", f"collect it with `{what}=True`")
     return files[row]
 
 
@@ -600,7 +645,7 @@ def scan(
     from synfeal.scanning.run import scan as fuse
 
     if gravity is not None and keep_axes:
-        raise SettingError("keep_axes", "contradicts gravity; leave one of the two out")
+        raise InputError(Argument("keep_axes"), "contradicts gravity", "leave one of the two out")
     start, stop = range or (0, None)
     job = ScanJob(
         sequence=Path(sequence),

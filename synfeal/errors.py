@@ -10,7 +10,6 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -54,13 +53,13 @@ class InputError(Exception):
     (:mod:`synfeal.cli.wording`), so a function answers its caller in the words of the call.
 
     Attributes:
-        where: File, with its line or field if there is one, or argument that is wrong; a message
-            that is of neither may stand here alone.
+        where: The file, a text that names a place in it, or the :class:`Argument`; a message about
+            neither may stand here alone.
         problem: What is wrong there.
         remedy: What to do about it, in the imperative.
     """
 
-    def __init__(self, where: Argument | Path | str, problem: str = "", remedy: str = "") -> None:
+    def __init__(self, where: object, problem: str = "", remedy: str = "") -> None:
         super().__init__(where, problem, remedy)
         self.where, self.problem, self.remedy = where, problem, remedy
 
@@ -71,19 +70,6 @@ class InputError(Exception):
         if len(line) > LONGEST:  # what a file holds is quoted in part; the remedy stands at the end
             line = f"{line[: LONGEST - 200]} ... {line[-190:]}"
         return line
-
-
-class SettingError(InputError):
-    """An argument that cannot be used.
-
-    Attributes:
-        where: The argument.
-    """
-
-    where: Argument
-
-    def __init__(self, field: str, problem: str) -> None:
-        super().__init__(Argument(field), problem)
 
 
 def exit_status(action: Callable[[], object], if_interrupted: str) -> int:

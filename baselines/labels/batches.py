@@ -114,7 +114,7 @@ def read_trajectory(path: Path) -> BatchTrajectory:
     values = read_numbers(path, HEADER, "batch trajectory")
     frame, registered = whole_numbers(values[:, :2], path).T
     if (frame != np.arange(len(frame))).any() or (registered > 1).any():
-        raise InputError(f"{path}: frames must count from 0, registered be 0 or 1; estimate again")
+        raise InputError(path, "frames must count from 0, registered be 0 or 1", "estimate again")
     check_unit(values[:, 5:9], path, np.arange(len(values)) + 2)
     return BatchTrajectory(pose_from_quat(values[:, 2:5], values[:, 5:9]), values[:, 1] == 1)
 

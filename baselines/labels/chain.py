@@ -345,7 +345,7 @@ def chain_split(
     for path, estimate, batch in zip(trajectories, estimates, batches, strict=True):
         if len(estimate) != len(batch):
             raise InputError(
-                f"{path}: holds {len(estimate)} poses for {len(batch)} frames; estimate it again"
+                path, f"holds {len(estimate)} poses for {len(batch)} frames", "estimate it again"
             )
     table, assistance = chain_batches(batches, estimates, true_table, cfg, anchored)
     write_pose_table(labels, table)

@@ -116,7 +116,9 @@ def beta_loss(name: str, hyper: LocalizerConfig) -> BetaLoss:
         InputError: the configuration gives no ``beta``.
     """
     if hyper.beta is None:
-        raise InputError(f"localizers.{name}.beta: must be given, {name} weighs orientation by it")
+        raise InputError(
+            f"localizers.{name}.beta", f"must be given, {name} weighs orientation by it"
+        )
     return BetaLoss(hyper.beta)
 
 

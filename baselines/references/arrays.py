@@ -45,7 +45,7 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
                 return {name: stored[name] for name in names}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(
-            f"{path}: cannot be read as arrays ({why(error)}); make it again"
+            path, f"cannot be read as arrays ({why(error)})", "make it again"
         ) from error
 
 

@@ -38,6 +38,6 @@ def read_costs(paths: Iterable[Path]) -> dict[str, float]:
         with read_as(path, "JSON", remedy=REMEDY):
             found = read_json(path)
         if not isinstance(found, dict) or not all(isinstance(s, float) for s in found.values()):
-            raise InputError(f"{path}: must hold seconds by name{REMEDY}")
+            raise InputError(path, f"must hold seconds by name{REMEDY}")
         costs |= found
     return costs

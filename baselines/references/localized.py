@@ -23,7 +23,7 @@ from baselines.references.redrawn import Redrawn, read_redrawn
 from baselines.training.localize import find_pictures, open_picture
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, SUPPORT
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import writing_to
 from synfeal.records.progress import Progress
@@ -101,7 +101,9 @@ def localize_in_map(
     """
     if not 0 < least_confidence < 1:
         raise InputError(
-            f"--confidence: must lie between 0 and 1, found {least_confidence:g}; 0.99 is usual"
+            Argument("confidence"),
+            f"must lie between 0 and 1, found {least_confidence:g}",
+            "0.99 is usual",
         )
     place = read_map(folder)
     pictures = find_pictures(named)
@@ -171,8 +173,10 @@ def _find(
     calibration = camera.of(image, path, turn)
     if calibration is None:
         raise InputError(
-            f"{path}: nothing says what its focal length is, which its pose depends on; give the"
-            " camera's calibration with --camera, or its focal length in pixels with --focal"
+            path,
+            "nothing says what its focal length is, which its pose depends on",
+            "give the camera's calibration with `camera`, or its focal length in pixels with"
+            " `focal_px`",
         )
     if camera.turns_with(image, turn):
         turned.append(path)
@@ -187,11 +191,11 @@ def _find(
 def _check_out(out: Path, pictures: Sequence[Path]) -> None:
     """Refuse to overwrite anything but poses of an earlier command."""
     if out.is_dir():
-        raise InputError(f"{out}: is a directory; name a file with --out")
+        raise InputError(out, "is a directory", "name a file with `out`")
     if not os.path.lexists(out):
         return
     if out.exists() and any(path.exists() and out.samefile(path) for path in pictures):
-        raise InputError(f"{out}: is one of the inputs; choose another file with --out")
+        raise InputError(out, "is one of the inputs", "choose another file with `out`")
     begins = f"{IMAGE},{','.join(COLUMNS[2:])}".encode()
     try:
         with out.open("rb") as file:
@@ -199,7 +203,7 @@ def _check_out(out: Path, pictures: Sequence[Path]) -> None:
     except OSError:
         holds_poses = False
     if not holds_poses:
-        raise InputError(f"{out}: exists and holds no poses; choose another file with --out")
+        raise InputError(out, "exists and holds no poses", "choose another file with `out`")
 
 
 def _write(
@@ -220,7 +224,7 @@ def _write(
     frame[status_column] = status
     frame[inliers] = [answer.support.inliers for answer in answers]
     frame[confidence] = [round(answer.support.confidence, DECIMALS) for answer in answers]
-    with writing_to(out, lambda: "choose another file with --out"):
+    with writing_to(out, lambda: "choose another file with `out`"):
         write_frame(out, frame, float_format=None)
 
 

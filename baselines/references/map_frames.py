@@ -19,7 +19,7 @@ from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
 from synfeal.dataset.sevenscenes import read_split
 from synfeal.dataset.world import read_sequence_from_world
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.axes import PosesAre, meant_poses
 from synfeal.mesh.load import UpAxis
 from synfeal.records.files import read_json
@@ -70,7 +70,7 @@ class MapFrames:
     def posed_depth(self) -> PosedDepth:
         """Depth and poses, to be checked against each other."""
         frames = PosedFrames(self.names, self.color, self.depth, self.world_from_cam)
-        return posed_depth(frames, self.rgbd, options=frozenset({"--convention", "--depth-scale"}))
+        return posed_depth(frames, self.rgbd, options=frozenset({"convention", "depth_scale"}))
 
     @property
     def camera(self) -> CameraConfig:
@@ -160,10 +160,12 @@ class FrameChoice:
     def __post_init__(self) -> None:
         stop = self.start + 1 if self.stop is None else self.stop
         if not 0 <= self.start < stop:
-            raise InputError(f"--range: needs 0 <= START < STOP, found {self.start} {stop}")
-        for flag, value in (("--stride", self.every), ("--most", self.most)):
+            raise InputError(
+                Argument("range"), f"needs 0 <= START < STOP, found {self.start} {stop}"
+            )
+        for name, value in (("stride", self.every), ("most", self.most)):
             if value < 1:
-                raise InputError(f"{flag}: must be at least 1, found {value}")
+                raise InputError(Argument(name), f"must be at least 1, found {value}")
 
     def rows(self, count: int) -> NDArray[np.int64]:
         """Choose among ``count`` frames that lie between ``start`` and ``stop``."""
@@ -195,8 +197,8 @@ def read_map_frames(
     rendered = (folder / MANIFEST).is_file()
     found = _training_frames(folder, frames) if rendered else read_posed_sequence(folder, frames)
     if not found.has_depth:
-        remedy = "collect it with --depth" if rendered else "give a sequence with depth images"
-        raise InputError(f"{folder}: has no depth images, which put features into space; {remedy}")
+        remedy = "collect it with `depth=True`" if rendered else "give a sequence with depth images"
+        raise InputError(folder, "has no depth images, which put features into space", remedy)
     rows = choice.rows(len(found))
     color = [found.color[row] for row in rows]
     depth = [file for row in rows if (file := found.depth[row]) is not None]
@@ -229,7 +231,7 @@ def _training_frames(folder: Path, frames: slice) -> PosedFrames:
     """Select training frames of a data set."""
     sequences = read_split(folder, "train")
     if not sequences:
-        raise InputError(f"{folder}: has no training frames to make a map of")
+        raise InputError(folder, "has no training frames to make a map of")
     parts = [(sequence.stem, read_posed_sequence(sequence)) for sequence in sequences]
     every = PosedFrames(
         names=tuple(f"{stem}/{name}" for stem, part in parts for name in part.names),
@@ -239,5 +241,5 @@ def _training_frames(folder: Path, frames: slice) -> PosedFrames:
     )
     chosen = every[frames]
     if not len(chosen):
-        raise InputError(f"{folder}: has {len(every)} training frames, none of them in --range")
+        raise InputError(folder, f"has {len(every)} training frames, none of them in `range`")
     return chosen

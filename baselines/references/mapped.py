@@ -155,8 +155,9 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
     features, views = _read_frames(frames)
     if len(features.slope) < FEWEST_FEATURES:
         raise InputError(
-            f"{frames.source}: only {len(features.slope)} features with depth in"
-            f" {len(frames)} frames, a map needs {FEWEST_FEATURES}; is it dark, or without texture?"
+            frames.source,
+            f"only {len(features.slope)} features with depth in {len(frames)} frames, a map needs"
+            f" {FEWEST_FEATURES}; is it dark, or without texture?",
         )
     torch.set_num_threads(1)
     vlad = Vlad.learn(views, seed)
@@ -183,7 +184,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         mesh_file=frames.mesh_file,
         record=record,
     )
-    with writing_to(out, lambda: "choose another folder with --out"):
+    with writing_to(out, lambda: "choose another folder with `out`"):
         write_map(made, out)
     return made
 
@@ -271,19 +272,19 @@ def read_map(folder: Path) -> StructureMap:
 def _read_record(folder: Path) -> tuple[dict[str, Any], Shown, Array | None]:
     path = folder / RECORD
     if not path.is_file():
-        raise InputError(f"{folder}: holds no {RECORD}; give the folder that synfeal map wrote")
+        raise InputError(folder, f"holds no {RECORD}", "give the folder that synfeal map wrote")
     with read_as(path, "the record of a map", remedy=f"; {REMEDY}"):
         record = read_json(path)
         if not isinstance(record, dict) or record.get("format") != FORMAT:
             raise ValueError(f"its format is not '{FORMAT}'")
     if record.get("version") != VERSION:
         raise InputError(
-            f"{path}: version: {record.get('version')!r} is not read, only {VERSION}; {REMEDY}"
+            path, f"version: {record.get('version')!r} is not read, only {VERSION}", REMEDY
         )
     try:
         shown = Shown.model_validate({key: record.get(key) for key in Shown.model_fields})
     except ValidationError as error:
-        raise InputError(f"{path}: {describe(error)}; {REMEDY}") from error
+        raise InputError(path, describe(error), REMEDY) from error
     sequence_from_world = None if record.get(KEY) is None else rigid_motion_of(record, path)
     return record, shown, sequence_from_world
 
@@ -304,7 +305,7 @@ def _check_shapes(
         and features.descriptor.shape == (count, 128)
     )
     if not whole:
-        raise InputError(f"{folder / FEATURES}: is not of the frames of {FRAMES}; {REMEDY}")
+        raise InputError(folder / FEATURES, f"is not of the frames of {FRAMES}", REMEDY)
     words, mean, axes = stored["words"], stored["mean"], stored["axes"]
     fits = (
         words.ndim == 2
@@ -315,4 +316,4 @@ def _check_shapes(
         and stored["vectors"].shape == (n_frames, axes.shape[1])
     )
     if not fits:
-        raise InputError(f"{folder / RETRIEVAL}: is not of the frames of {FRAMES}; {REMEDY}")
+        raise InputError(folder / RETRIEVAL, f"is not of the frames of {FRAMES}", REMEDY)

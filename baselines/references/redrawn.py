@@ -26,7 +26,7 @@ from baselines.references.structure import pinhole, supported_pose
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import RenderConfig
 from synfeal.dataset.world import read_scan_record
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
@@ -189,8 +189,10 @@ def read_redrawn(place: StructureMap, file: Path, folder: Path, seed: int = 0) -
     share = opened.share_on_mesh()
     if share < LEAST_ON_MESH:
         raise InputError(
-            f"--refine: {file}: only {share:.0%} of the features of {folder} lie on this mesh; give"
-            " the one that its frames were rendered of, or that was scanned from its photographs"
+            Argument("refine"),
+            f"{file}: only {share:.0%} of the features of {folder} lie on this mesh",
+            "give the one that its frames were rendered of, or that was scanned from its"
+            " photographs",
         )
     return opened
 

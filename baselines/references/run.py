@@ -201,16 +201,17 @@ def run_external(
         subprocess.run(words, check=True)
     except (KeyError, ValueError, IndexError) as error:
         raise InputError(
-            f"references.external: command '{command}' cannot be filled ({why(error)});"
-            f" placeholders are {', '.join(values)}"
+            "references.external",
+            f"command '{command}' cannot be filled ({why(error)}); placeholders are"
+            f" {', '.join(values)}",
         ) from error
     except (OSError, subprocess.CalledProcessError) as error:
         raise InputError(
-            f"references.external: command '{command}' failed ({why(error)});"
-            " the job's log has the rest"
+            "references.external",
+            f"command '{command}' failed ({why(error)}); the job's log has the rest",
         ) from error
     if not out.is_file():
-        raise InputError(f"references.external: command '{command}' wrote no {out}")
+        raise InputError("references.external", f"command '{command}' wrote no {out}")
     return out
 
 
@@ -231,12 +232,13 @@ def read_answers(path: Path, frames: PoseTable) -> PoseTable:
     found = read_frame(path, ANSWERS, f"write the columns {','.join(ANSWERS)}")
     twice = found.frame[found.frame.duplicated()]
     if len(twice):
-        raise InputError(f"{path}: frame {twice.iloc[0]} appears twice; keep one answer")
+        raise InputError(path, f"frame {twice.iloc[0]} appears twice", "keep one answer")
     unknown = found.frame[~found.frame.isin(frames.frame)]
     if len(unknown):
         raise InputError(
-            f"{path}: frame {unknown.iloc[0]} is not in the test set of {len(frames)} frames,"
-            " which are counted from 0"
+            path,
+            f"frame {unknown.iloc[0]} is not in the test set of {len(frames)} frames, which are"
+            " counted from 0",
         )
     values = found.set_index("frame").reindex(frames.frame).to_numpy()
     return PoseTable(frames.frame, frames.path, values[:, :3], values[:, 3:])

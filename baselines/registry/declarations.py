@@ -45,8 +45,9 @@ def declared(kind: type[K]) -> dict[str, K]:
             other = found.get(declaration.name)
             if other is not None:
                 raise InputError(
-                    f"{declaration.place}: the name '{declaration.name}' is taken by"
-                    f" {other.place}; choose another"
+                    declaration.place,
+                    f"the name '{declaration.name}' is taken by {other.place}",
+                    "choose another",
                 )
             found[declaration.name] = declaration
     return {method.name: method for method in sorted(found.values(), key=_order)}
@@ -81,14 +82,16 @@ def _installed(group: str) -> tuple[tuple[str, Path], ...]:
             spec = None
         if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
             raise InputError(
-                f"{entry.module}: the module of the entry point '{entry.name}' of"
-                f" {group} is not there; install its package again, or remove it"
+                entry.module,
+                f"the module of the entry point '{entry.name}' of {group} is not there",
+                "install its package again, or remove it",
             )
         source = Path(spec.origin)
         if not any(_declarations(entry.module, source, kind) for kind in kinds):
             raise InputError(
-                f"{source}: declares nothing, though the entry point '{entry.name}' of"
-                f" {group} names it; see docs/adding.md"
+                source,
+                f"declares nothing, though the entry point '{entry.name}' of {group} names it",
+                "see docs/adding.md",
             )
         found.append((entry.module, source))
     return tuple(found)
@@ -130,13 +133,13 @@ def _declaration(decorator: ast.Call, source: Path, kind: type[Kind]) -> Kind:
         arguments = {str(each.arg): ast.literal_eval(each.value) for each in decorator.keywords}
     except ValueError as error:
         raise InputError(
-            f"{where}: arguments must be literals, for they are read without running the module"
+            where, "arguments must be literals, for they are read without running the module"
         ) from error
     try:
         declaration = kind(**arguments)
     except TypeError as error:  # an argument is missing or unknown
-        raise InputError(f"{where}: {str(error).partition('() ')[2]}") from error
+        raise InputError(where, str(error).partition("() ")[2]) from error
     pattern, allowed = kind.names
     if not re.fullmatch(pattern, declaration.name):
-        raise InputError(f"{where}: name: '{declaration.name}' must be {allowed}")
+        raise InputError(where, f"name: '{declaration.name}' must be {allowed}")
     return declaration

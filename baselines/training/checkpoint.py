@@ -107,8 +107,9 @@ def frame_camera(frames: Path) -> FrameCamera | None:
         return FrameCamera.model_validate({key: camera[key] for key in FrameCamera.model_fields})
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(
-            f"{record}: cannot be read as the record of packed frames ({why(error)});"
-            " pack them again"
+            record,
+            f"cannot be read as the record of packed frames ({why(error)})",
+            "pack them again",
         ) from error
 
 
@@ -178,14 +179,15 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
     content = _read(path, device)
     if "description" not in content:
         raise InputError(
-            f"{path}: does not say which localizer it is (written before checkpoints did);"
-            " train it again"
+            path,
+            "does not say which localizer it is (written before checkpoints did)",
+            "train it again",
         )
     try:
         description = ModelDescription.model_validate(_with_auxiliary(content))
     except ValidationError as error:
         reason = describe(error)
-        raise InputError(f"{path}: its description cannot be used ({reason})") from error
+        raise InputError(path, f"its description cannot be used ({reason})") from error
     network = build_localizer(description.localizer, description.network, description.hyper)
     network.place_on(device)
     try:
@@ -196,8 +198,9 @@ def read_checkpoint(path: Path, device: torch.device) -> TrainedLocalizer:
         if is_out_of_memory(error):
             raise
         raise InputError(
-            f"{path}: its weights are not those of the {description.localizer} it describes;"
-            " train it again"
+            path,
+            f"its weights are not those of the {description.localizer} it describes",
+            "train it again",
         ) from error
     return TrainedLocalizer(description, network.eval(), statistics, calibration)
 
@@ -219,15 +222,15 @@ def _with_auxiliary(content: dict[str, Any]) -> Any:
 
 def _read(path: Path, device: torch.device) -> dict[str, Any]:
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file; name the model.pt of a training run")
+        raise InputError(path, "there is no such file", "name the model.pt of a training run")
     try:
         content = load_saved(path, device)
     except (OSError, ValueError) as error:
         raise InputError(
-            f"{path}: is damaged or no trained localizer; name the model.pt of a training run"
+            path, "is damaged or no trained localizer", "name the model.pt of a training run"
         ) from error
     if not isinstance(content, dict) or not {"localizer", "images"} <= content.keys():
-        raise InputError(f"{path}: holds no trained localizer; name the model.pt of a training run")
+        raise InputError(path, "holds no trained localizer", "name the model.pt of a training run")
     return content
 
 

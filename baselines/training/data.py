@@ -104,12 +104,14 @@ def read_images(
     frames = read_packed(path)
     if frames.shape[1] != input_px:
         raise InputError(
-            f"{path}: holds {frames.dtype} {frames.shape}, expected uint8 (N, {input_px}, "
-            f"{input_px}, 3) for this network.input_px; pack the frames again"
+            path,
+            f"holds {frames.dtype} {frames.shape}, expected uint8 (N, {input_px}, {input_px}, 3)"
+            " for this network.input_px",
+            "pack the frames again",
         )
     thinned = frames[::every]
     if len(thinned) < count:
-        raise InputError(f"{path}: holds {len(thinned)} frames, but {count} are labelled")
+        raise InputError(path, f"holds {len(thinned)} frames, but {count} are labelled")
     n_bytes = count * input_px**2 * 3
     if device.type == "cpu" and n_bytes > MOST_READ_BYTES and every == 1:
         content = torch.from_file(str(path), size=frames.offset + n_bytes, dtype=torch.uint8)
@@ -139,10 +141,10 @@ def read_labelled_frames(
     """
     table = read_pose_table(labels)
     if len(table) == 0:
-        raise InputError(f"{labels}: has no rows; nothing to learn from")
+        raise InputError(labels, "has no rows; nothing to learn from")
     usable = table.usable_rows
     if len(usable) == 0:
-        raise InputError(f"{labels}: no frame is registered; nothing to learn from")
+        raise InputError(labels, "no frame is registered; nothing to learn from")
     images = read_images(frames, len(table), input_px, device)
     rows = torch.as_tensor(usable, device=device)
     known = table.at(usable)

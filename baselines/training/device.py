@@ -8,7 +8,7 @@ from typing import Literal
 
 import torch
 
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 
 Precision = Literal["float32", "bfloat16"]
 
@@ -25,7 +25,7 @@ def open_device(wanted: Literal["auto", "cpu", "cuda"]) -> torch.device:
     """
     if wanted == "cuda" and not torch.cuda.is_available():
         raise InputError(
-            "training.device or --device: 'cuda' is asked for, but torch finds no GPU; use 'auto'"
+            Argument("device"), "'cuda' is asked for, but torch finds no GPU", "use 'auto'"
         )
     if wanted != "cpu" and torch.cuda.is_available():
         return torch.device("cuda")

@@ -108,8 +108,9 @@ def read_scorable(labels: Path, truth: Path, depth: Path) -> PoseTable:
     labelled, true = read_pose_table(labels), read_pose_table(truth)
     if not np.array_equal(labelled.frame, true.frame):
         raise InputError(
-            f"{truth}: its frames are not those of {labels} ({len(true)} and {len(labelled)}"
-            " rows); make both anew"
+            truth,
+            f"its frames are not those of {labels} ({len(true)} and {len(labelled)} rows)",
+            "make both anew",
         )
     read_cell_depth(depth, len(labelled))
     return true

@@ -29,7 +29,7 @@ from synfeal.camera.photograph import PhotographCamera, Source
 from synfeal.dataset.images import HEIF, HEIF_REMEDY, HEIF_SUFFIXES, read_image, reads_heif
 from synfeal.dataset.packed import NetworkView, fit_frame
 from synfeal.dataset.pose_table import COLUMNS, SEEN
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 from synfeal.records.files import writing_to
 from synfeal.records.progress import Progress
@@ -120,7 +120,7 @@ def localize(
     """
     trained = read_checkpoint(model, open_device(device))
     if not 0 <= turns <= MOST_TURNS:
-        raise InputError(f"--turns: must be 0 to {MOST_TURNS}, found {turns}")
+        raise InputError(Argument("turns"), f"must be 0 to {MOST_TURNS}, found {turns}")
     reader = PictureReader(trained.description, camera or PhotographCamera(exif=False), model)
     pictures = find_pictures(named)
     _check_out(out, [model, *pictures])
@@ -257,11 +257,11 @@ def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], reader: PictureR
 
 def _check_out(out: Path, inputs: Sequence[Path]) -> None:
     if out.is_dir():
-        raise InputError(f"{out}: is a directory; name a file with --out")
+        raise InputError(out, "is a directory", "name a file with `out`")
     if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
-        raise InputError(f"{out}: is one of the inputs; choose another file with --out")
+        raise InputError(out, "is one of the inputs", "choose another file with `out`")
     if os.path.lexists(out) and not _holds_poses(out):
-        raise InputError(f"{out}: exists and holds no poses; choose another file with --out")
+        raise InputError(out, "exists and holds no poses", "choose another file with `out`")
 
 
 def _holds_poses(out: Path) -> bool:
@@ -290,7 +290,7 @@ def _write(
     frame.insert(0, HEADER[0], pd.Series([str(path) for path in pictures], dtype=object))
     further = seen.status(good), seen.typicality, seen.outside_m
     frame = frame.assign(**dict(zip(SEEN, further, strict=True)))
-    with writing_to(out, lambda: "choose another file with --out"):
+    with writing_to(out, lambda: "choose another file with `out`"):
         write_frame(out, frame, float_format=None, na_rep="nan")
 
 
@@ -313,7 +313,7 @@ def find_pictures(named: Iterable[Path]) -> list[Path]:
     found: list[Path] = []
     for path in named:
         if not (path.is_dir() or path.is_file()):
-            raise InputError(f"{path}: there is no such picture or directory")
+            raise InputError(path, "there is no such picture or directory")
         found += _in(path) if path.is_dir() else [path]
     return found
 
@@ -347,8 +347,9 @@ def open_picture(path: Path) -> Upright:
     image = read_image(path, "RGB", formats=FORMATS, most_pixels=MOST_PIXELS, remedy=LEAVE_OUT)
     if max(image.size) > MAX_ASPECT * min(image.size):
         raise InputError(
-            f"{path}: is {image.width} x {image.height} pixels, too long for a square to be cut"
-            f" out{LEAVE_OUT}"
+            path,
+            f"is {image.width} x {image.height} pixels, too long for a square to be cut"
+            f" out{LEAVE_OUT}",
         )
     return upright(image)
 
@@ -380,9 +381,10 @@ class PictureReader:
         self.source = camera.source
         if self._target is None and camera.source in ("file", "focal"):
             raise InputError(
-                f"{model}: does not say which camera its training frames are of, so pictures"
-                " cannot be brought to it; leave the calibration out, or train on a data set of"
-                " synfeal collect"
+                model,
+                "does not say which camera its training frames are of, so pictures cannot be"
+                " brought to it",
+                "leave the calibration out, or train on a data set of synfeal collect",
             )
         self._resamplers: dict[Calibration, Resampler | None] = {}
         self.read_s: list[float] = []
@@ -420,19 +422,19 @@ def _in(directory: Path) -> list[Path]:
     try:
         files = sorted(path for path in directory.iterdir() if path.is_file())
     except OSError as error:
-        raise InputError(f"{directory}: cannot be listed ({error.strerror})") from error
+        raise InputError(directory, f"cannot be listed ({error.strerror})") from error
     if any(directory.glob("seq-[0-9]*")):
-        raise InputError(f"{directory}: is a data set; name its sequences, {directory}/seq-01")
+        raise InputError(directory, "is a data set", f"name its sequences, {directory}/seq-01")
     found = [path for path in files if _is_picture(path.name.lower())]
     heif = [path for path in found if path.suffix.lower() in HEIF_SUFFIXES]
     if heif and not reads_heif():
         which = f"{len(heif)} of {len(found)} photographs are HEIC ({heif[0].name}, ...)"
         if len(heif) == len(found):
-            raise InputError(f"{directory}: {which}, which needs pillow-heif: {HEIF_REMEDY}")
+            raise InputError(directory, f"{which}, which needs pillow-heif: {HEIF_REMEDY}")
         log.warning("%s: %s and left out: %s", directory, which, HEIF_REMEDY)
         found = [path for path in found if path not in heif]
     if not found:
-        raise InputError(f"{directory}: holds no {', '.join(SUFFIXES)}; name another directory")
+        raise InputError(directory, f"holds no {', '.join(SUFFIXES)}", "name another directory")
     return found
 
 

@@ -43,7 +43,7 @@ from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_ta
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
 from synfeal.dataset.world import read_sequence_from_world
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import file_sha256, read_json, write_json
 from synfeal.records.progress import Progress
@@ -68,8 +68,9 @@ class FrameRange:
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop:
             raise InputError(
-                f"--range: {self.start} {self.stop} holds no frame; give the first frame, from 0,"
-                " and one past the last"
+                Argument("range"),
+                f"{self.start} {self.stop} holds no frame",
+                "give the first frame, from 0, and one past the last",
             )
 
 
@@ -140,7 +141,7 @@ def read_own_frames(folder: Path, ranges: Sequence[FrameRange]) -> OwnFrames:
         sequences = [read_posed_sequence(path) for path in read_split(folder, "train")]
         if not sequences:
             raise InputError(
-                f"{folder / SPLIT_FILES['train']}: names no sequence; collect training frames"
+                folder / SPLIT_FILES["train"], "names no sequence", "collect training frames"
             )
     if rendered and split:
         parts, path = sequences, _paths_of_table(folder, sum(map(len, sequences)))
@@ -212,8 +213,9 @@ def _ranges_of(
         part = whole[chosen.start : chosen.stop]
         if not len(part):
             raise InputError(
-                f"{folder}: a sequence has {len(whole)} frames, none of them in --range"
-                f" {chosen.start} {chosen.stop}"
+                folder,
+                f"a sequence has {len(whole)} frames, none of them in"
+                f" `range=({chosen.start}, {chosen.stop})`",
             )
         yield part
 
@@ -226,8 +228,9 @@ def _paths_of_table(folder: Path, n_frames: int) -> NDArray[np.int64] | None:
     path = read_pose_table(table).path
     if len(path) != n_frames:
         raise InputError(
-            f"{table}: has {len(path)} rows, but the sequences of the split hold {n_frames}"
-            " frames; run synfeal validate"
+            table,
+            f"has {len(path)} rows, but the sequences of the split hold {n_frames} frames",
+            "run synfeal validate",
         )
     return path
 
@@ -294,8 +297,10 @@ def pack_own_frames(
             image = _resampled(photograph, file, photographs, target, resamplers)
         elif own.camera is not None and image.size != (own.camera.width, own.camera.height):
             raise InputError(
-                f"{file}: is of {image.width}x{image.height} pixels, {own.folder / MANIFEST} says"
-                f" {own.camera.width}x{own.camera.height}; collect the data set again"
+                file,
+                f"is of {image.width}x{image.height} pixels, {own.folder / MANIFEST} says"
+                f" {own.camera.width}x{own.camera.height}",
+                "collect the data set again",
             )
         return fit_frame(image, network.input_px, network.view), turn
 
@@ -337,8 +342,9 @@ def _target_camera(sets: Sequence[OwnFrames], photographs: PhotographCamera) -> 
     if len(cameras) > 1:
         first, second = list(cameras.values())[:2]
         raise InputError(
-            f"{second.folder / MANIFEST}: camera: is another than that of {first.folder}; collect"
-            " both with one camera, or train on one of them"
+            second.folder / MANIFEST,
+            f"camera: is another than that of {first.folder}",
+            "collect both with one camera, or train on one of them",
         )
     if cameras:
         return next(iter(cameras))
@@ -356,8 +362,10 @@ def _refuse_beside(own: OwnFrames, camera: CameraConfig, sets: Sequence[OwnFrame
     for other in sets:
         if other.wide != camera:
             raise InputError(
-                f"{own.folder / MANIFEST}: camera: is {camera.projection}, and frames of"
-                f" {other.folder} cannot be brought to it; train on one of them"
+                own.folder / MANIFEST,
+                f"camera: is {camera.projection}, and frames of {other.folder} cannot be brought"
+                " to it",
+                "train on one of them",
             )
 
 

@@ -54,7 +54,7 @@ def read_training_record(path: Path) -> dict[str, Any]:
             raise ValueError("parameters and sha256 must be mappings")
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise InputError(
-            f"{path}: cannot be read as the record of a training run ({why(error)}); train it again"
+            path, f"cannot be read as the record of a training run ({why(error)})", "train it again"
         ) from error
     return dict(record)
 
@@ -72,6 +72,7 @@ def check_same_labels(run: Path, test_labels: Path) -> None:
     recorded = read_training_record(run / RECORD)["sha256"].get("test_labels")
     if recorded != file_sha256(test_labels):
         raise InputError(
-            f"{test_labels}: not the labels that {run / 'predictions.csv'} was made for; restore"
-            " both from one file, or delete the directory of the run to train it again"
+            test_labels,
+            f"not the labels that {run / 'predictions.csv'} was made for",
+            "restore both from one file, or delete the directory of the run to train it again",
         )

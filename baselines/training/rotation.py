@@ -115,8 +115,9 @@ def random_rotation(
     if camera is None or any(camera.distortion):
         reason = "names no perspective camera" if camera is None else "names a lens with distortion"
         raise InputError(
-            f"{frames.with_suffix('.json')}: {reason}; images can only be rotated through a known "
-            "pinhole camera, so set training.augmentation to 0"
+            frames.with_suffix(".json"),
+            f"{reason}; images can only be rotated through a known pinhole camera, so set"
+            " training.augmentation to 0",
         )
     intrinsics = packed_intrinsics(camera, network)
     return RandomRotation(intrinsics, network.input_px, augmentation, seed, device)

@@ -176,7 +176,7 @@ def score_common(predictions: Path, truth: Path, out: Path) -> None:
     predicted, whole = read_predictions(predictions), read_pose_table(truth)
     poses = whole.at(np.flatnonzero(np.isin(whole.frame, predicted.frame)))
     if not np.array_equal(poses.frame, predicted.frame):
-        raise InputError(f"{predictions}: has frames that {truth} does not have; predict again")
+        raise InputError(predictions, f"has frames that {truth} does not have", "predict again")
     score_common_poses(predicted, poses, out)
 
 
@@ -201,7 +201,7 @@ def read_predictions(path: Path) -> PoseTable:
     """Read a pose table whose poses may be ``nan``, unlike labels."""
     values = read_numbers(path, HEADER, "table of predictions", finite=False)
     if not len(values):
-        raise InputError(f"{path}: has no rows; predict again")
+        raise InputError(path, "has no rows", "predict again")
     frame, straight_path = whole_numbers(values[:, :2], path).T
     return PoseTable(frame, straight_path, values[:, 2:5], values[:, 5:9])
 
@@ -210,7 +210,8 @@ def _read_like(path: Path, predicted: PoseTable) -> PoseTable:
     table = read_pose_table(path)
     if not np.array_equal(table.frame, predicted.frame):
         raise InputError(
-            f"{path}: its frames are not those of predictions.csv ({len(table)} and "
-            f"{len(predicted)} rows); predict again for these labels"
+            path,
+            f"its frames are not those of predictions.csv ({len(table)} and {len(predicted)} rows)",
+            "predict again for these labels",
         )
     return table

@@ -39,7 +39,7 @@ from baselines.training.run import Job, step_seconds, train_localizer
 from baselines.training.selection import HeldOutErrors, kept_errors
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.config.photometric import PhotometricConfig
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError, wording
 from synfeal.records.files import read_json, refuse_foreign, refuse_inside, write_json, writing_to
 from synfeal.records.provenance import provenance
 
@@ -213,18 +213,22 @@ def _trained(
 
 def _check(job: TrainJob) -> None:
     if job.images is not None and not 1 <= job.images <= MOST_IMAGES:
-        raise InputError(f"--images: must be 1 to {MOST_IMAGES:,}, found {job.images}")
+        raise InputError(Argument("images"), f"must be 1 to {MOST_IMAGES:,}, found {job.images}")
     if job.minutes is not None and not 0 < job.minutes < 1e6:
-        raise InputError(f"--minutes: must be above 0 and below 1e6, found {job.minutes:g}")
+        raise InputError(
+            Argument("minutes"), f"must be above 0 and below 1e6, found {job.minutes:g}"
+        )
     if job.batch < 1:
-        raise InputError(f"--batch: must be at least 1, found {job.batch}")
+        raise InputError(Argument("batch"), f"must be at least 1, found {job.batch}")
     if job.start is not None and not job.start.is_file():
-        raise InputError(f"--start: {job.start} is no file; name a backbone's weights")
+        raise InputError(Argument("start"), f"{job.start} is no file", "name a backbone's weights")
     if not 0 <= job.held_out < 1:
-        raise InputError(f"--held-out: must be a share from 0 to below 1, found {job.held_out:g}")
+        raise InputError(
+            Argument("held_out"), f"must be a share from 0 to below 1, found {job.held_out:g}"
+        )
     named = [path.resolve() for path in job.datasets]
     if len(set(named)) < len(named):
-        raise InputError(f"{job.datasets[0]}: one data set is named twice; name each once")
+        raise InputError(job.datasets[0], "one data set is named twice", "name each once")
     own = (MODEL, HISTORY, RECORD, *TEMPORARY)
     present = sorted(p.name for p in job.out.glob("*")) if job.out.is_dir() else []
     left = [name for name in present if name.startswith(".") and _is_left(name)]
@@ -235,12 +239,14 @@ def _check(job: TrainJob) -> None:
 
 def _refuse_useless(job: TrainJob, sets: Sequence[OwnFrames]) -> None:
     """Refuse what is said of photographs where there are none."""
-    camera = {"file": "--camera", "focal": "--focal"}.get(str(job.photographs.source))
-    for option in ("--range" if job.ranges else None, camera):
-        if option and all(own.is_rendered for own in sets):
+    camera = {"file": "camera", "focal": "focal_px"}.get(str(job.photographs.source))
+    for name in ("range" if job.ranges else None, camera):
+        if name and all(own.is_rendered for own in sets):
             raise InputError(
-                f"{option}: is of photographs, and {sets[0].folder} is a data set of synfeal"
-                " collect, which says its own; leave it out"
+                Argument(name),
+                f"is of photographs, and {sets[0].folder} is a data set of synfeal collect, which"
+                " says its own",
+                "leave it out",
             )
 
 
@@ -259,8 +265,9 @@ def _network(job: TrainJob, device: torch.device) -> NetworkConfig:
         return NetworkConfig.model_validate(usual.model_dump() | chosen)
     except ValidationError as error:
         field = str(error.errors()[0]["loc"][0])
-        option = f"--{field.replace('_', '-')}"
-        raise InputError(f"{option}: {error.errors()[0]['msg']}, found {asked[field]}") from error
+        raise InputError(
+            Argument(field), f"{wording(error.errors()[0])}, found {asked[field]}"
+        ) from error
 
 
 def _refuse_what_does_not_fit(
@@ -277,9 +284,10 @@ def _refuse_what_does_not_fit(
     needed = training_mb(n_held, network, job.batch)
     if free is not None and needed > free:
         raise InputError(
-            f"--batch: {job.batch} images of {network.input_px} pixels and width"
-            f" {network.width:g} take about {needed / 1e3:.1f} GB, and {free / 1e3:.1f} GB are free"
-            f" on {device.type}; lower --batch, --input-px or --width"
+            Argument("batch"),
+            f"{job.batch} images of {network.input_px} pixels and width {network.width:g} take"
+            f" about {needed / 1e3:.1f} GB, and {free / 1e3:.1f} GB are free on {device.type}",
+            "lower `batch`, `input_px` or `width`",
         )
 
 
@@ -320,8 +328,9 @@ def _finished(job: TrainJob, settings: dict[str, Any]) -> TrainedModel:
     if differing or not (job.out / MODEL).is_file():
         what = f"with another {differing[0]}" if differing else "and its model.pt is gone"
         raise InputError(
-            f"{job.out}: holds a localizer trained {what}; delete it or choose another directory"
-            " with --out"
+            job.out,
+            f"holds a localizer trained {what}",
+            "delete it or choose another directory with `out`",
         )
     errors = None if record["held_out"] is None else HeldOutErrors(**record["held_out"])
     n_frames = sum(record["frames"].values())

@@ -124,7 +124,7 @@ def open_batch(case: BatchCase) -> BatchFiles:
     )
     if not poses[-1].exists():
         raise InputError(
-            f"{poses[-1]}: is missing; give a longer sequence, or lower start or length"
+            poses[-1], "is missing", "give a longer sequence, or lower start or length"
         )
     return BatchFiles(color, depth, np.array([read_pose(path) for path in poses]))
 

@@ -112,8 +112,9 @@ def compare_trees(root_a: Path, root_b: Path) -> Comparison:
     shared = [key for key in found_a if key in found_b]
     if not shared:
         raise InputError(
-            f"{root_b}: has no run in common with {root_a} (of {len(found_b)} and {len(found_a)});"
-            " compare trees of the same experiments"
+            root_b,
+            f"has no run in common with {root_a} (of {len(found_b)} and {len(found_a)})",
+            "compare trees of the same experiments",
         )
 
     @cache
@@ -181,8 +182,10 @@ def find_runs(root: Path) -> dict[tuple[str, ...], list[Path]]:
         found.setdefault(key, []).append(path.parent)
     if not found:
         raise InputError(
-            f"{root}: not a results tree; name a directory that holds"
-            " runs/<scene>/<size>/<labels>/<init>/<model>/seed<k>/metrics.json"
+            root,
+            "not a results tree",
+            "name a directory that holds"
+            " runs/<scene>/<size>/<labels>/<init>/<model>/seed<k>/metrics.json",
         )
     return found
 
@@ -192,7 +195,7 @@ def read_run(seeds: Sequence[Path]) -> RunErrors:
     index = [_read_index(seed) for seed in seeds]
     for seed, found in zip(seeds, index, strict=True):
         if not np.array_equal(found, index[0]):
-            raise InputError(f"{seed}: was tested on other frames than {seeds[0]}; run both again")
+            raise InputError(seed, f"was tested on other frames than {seeds[0]}", "run both again")
     frame, path = index[0].T
     return RunErrors(frame, path, np.stack([_read_seed(seed, frame) for seed in seeds]))
 
@@ -202,7 +205,7 @@ def _read_index(seed: Path) -> NDArray[np.int64]:
     path = seed / "predictions.csv"
     values = read_numbers(path, HEADER, "table of predictions", finite=False)[:, :2]
     if not len(values):
-        raise InputError(f"{path}: has no rows; predict again")
+        raise InputError(path, "has no rows", "predict again")
     return whole_numbers(values, path)
 
 
@@ -211,10 +214,10 @@ def _read_seed(seed: Path, frame: NDArray[np.int64]) -> Array:
     path = seed / "errors.csv"
     table = read_errors(path)
     if not np.array_equal(table["frame"], frame):
-        raise InputError(f"{path}: its frames are not those of predictions.csv; {REMEDY}")
+        raise InputError(path, "its frames are not those of predictions.csv", REMEDY)
     errors = table[list(MEASURES)].to_numpy().T
     if (errors < 0).any():
-        raise InputError(f"{path}: holds an error below zero; {REMEDY}")
+        raise InputError(path, "holds an error below zero", REMEDY)
     errors = np.where(np.isnan(errors), np.inf, errors)
     path = seed / "metrics.json"
     metrics = read_metrics(path)
@@ -222,7 +225,8 @@ def _read_seed(seed: Path, frame: NDArray[np.int64]) -> Array:
         noted = math.inf if metrics[measure] is None else metrics[measure]
         if not math.isclose(noted, median, rel_tol=1e-6):
             raise InputError(
-                f"{path}: {measure} is {metrics[measure]}, the median of errors.csv {median:.6g};"
-                f" {REMEDY}"
+                path,
+                f"{measure} is {metrics[measure]}, the median of errors.csv {median:.6g}",
+                REMEDY,
             )
     return errors

@@ -20,7 +20,7 @@ def parse_config(raw: Mapping[str, Any], origin: str = "config") -> Config:
     try:
         return Config.model_validate(dict(raw))
     except ValidationError as error:
-        raise InputError(f"{origin}: {describe(error)}") from error
+        raise InputError(origin, describe(error)) from error
 
 
 def load_config(*paths: Path) -> Config:
@@ -43,6 +43,8 @@ def check_results(root: Path) -> None:
     try:
         place = next(path for path in (root, *root.parents) if os.path.lexists(path))
     except OSError as error:
-        raise InputError(f"results: {root}: {error.strerror}; choose another directory") from error
+        raise InputError(
+            "results", f"{root}: {error.strerror}", "choose another directory"
+        ) from error
     if not place.is_dir():
-        raise InputError(f"results: {place} is not a directory; choose another one")
+        raise InputError("results", f"{place} is not a directory", "choose another one")

@@ -163,7 +163,7 @@ def _of_asked_tables(rows: Sequence[Experiment], config: Config) -> tuple[Experi
     asked = [row for row in rows if config.tables is None or row.table in config.tables]
     if not asked:
         of = "" if config.tables is None else f" of tables {', '.join(config.tables)}"
-        raise InputError(f"{design_name(config)}: has no rows{of}; nothing would be run")
+        raise InputError(design_name(config), f"has no rows{of}; nothing would be run")
     return tuple(asked)
 
 
@@ -175,7 +175,7 @@ def _every_row(config: Config) -> tuple[Experiment, ...]:
         try:
             experiment = Experiment.model_validate(row)
         except ValidationError as error:
-            raise InputError(f"{where}: {describe(error)}") from error
+            raise InputError(where, describe(error)) from error
         keys = KEYS[experiment.table]
         identity = (experiment.table, *(str(getattr(experiment, key)) for key in keys))
         problem = _problem(experiment, config)
@@ -183,7 +183,7 @@ def _every_row(config: Config) -> tuple[Experiment, ...]:
             shown = f"{experiment.table} shows each {', '.join(keys)} once"
             problem = f"{shown}, as in {seen[identity]}"
         if problem:
-            raise InputError(f"{where}: {problem}")
+            raise InputError(where, problem)
         seen[identity] = where
         experiments.append(experiment)
     return tuple(experiments)
@@ -322,8 +322,8 @@ def read_design(config: Config) -> Design:
     if missing:
         scene, size = missing[0]
         raise InputError(
-            f"estimation.more_scenes: '{scene}': {design_name(config)} has no row of size"
-            f" '{size}' in that scene"
+            "estimation.more_scenes",
+            f"'{scene}': {design_name(config)} has no row of size '{size}' in that scene",
         )
     # `tables` may leave out every row of a further scene: then its labels are left out, too.
     design = whole.model_copy(update={"rows": _of_asked_tables(every_row, config)})
@@ -345,10 +345,12 @@ def _check_robustness(config: Config) -> None:
         return
     if scene not in config.scenes:
         known = sorted(config.scenes)
-        raise InputError(f"robustness.scene: '{scene}' is not one of {known}")
+        raise InputError("robustness.scene", f"'{scene}' is not one of {known}")
     if size not in config.scenes[scene].sizes:
         known = sorted(config.scenes[scene].sizes)
-        raise InputError(f"robustness.size: '{size}' is not one of {known}, the sizes of '{scene}'")
+        raise InputError(
+            "robustness.size", f"'{size}' is not one of {known}, the sizes of '{scene}'"
+        )
 
 
 def _compared(row: Experiment) -> list[Experiment]:

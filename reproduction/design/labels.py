@@ -21,7 +21,7 @@ def check_sources(rows: Sequence[Experiment], design: Path | str) -> None:
     known = (SIMULATOR, *INJECTED, *METHODS)
     for row in rows:
         if row.labels not in known:
-            raise InputError(f"{design}: labels '{row.labels}': not one of {', '.join(known)}")
+            raise InputError(design, f"labels '{row.labels}': not one of {', '.join(known)}")
 
 
 def estimation_parameters(config: Config, name: str) -> dict[str, Any]:

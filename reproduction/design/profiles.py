@@ -46,5 +46,5 @@ def profile_path(name: str) -> Path:
     found = {str(read_yaml(path).get("profile", path.stem)): path for path in paths}
     if name not in found:
         known = ", ".join(sorted(found)) or "none"
-        raise InputError(f"profile '{name}': no such profile in {FOLDER}/; known: {known}")
+        raise InputError(f"profile '{name}'", f"no such profile in {FOLDER}/; known: {known}")
     return found[name]

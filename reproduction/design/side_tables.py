@@ -162,5 +162,5 @@ def _values(files: Files, table: str, name: str, of: str) -> Sequence[str]:
     if name not in NAMES or of:
         known = ", ".join([*NAMES, "run:<table>", "table:<name>"])
         field = f"{name}:{of}" if of else name
-        raise InputError(f"{SIDE_TABLES[table].place}: needs: {field!r} is not one of {known}")
+        raise InputError(SIDE_TABLES[table].place, f"needs: {field!r} is not one of {known}")
     return NAMES[name](files)

@@ -75,7 +75,7 @@ def _errors(results: Results, row: Experiment, model: str) -> dict[str, Array]:
         path = results.root / "runs" / run.directory / "errors.csv"
         parts.append(read_errors(path))
         if parts[-1].empty:
-            raise InputError(f"{path}: needs rows; score that run again")
+            raise InputError(path, "needs rows; score that run again")
     values = pd.concat(parts)
     errors = {measure: values[measure].to_numpy() for measure in TRUE}
     return errors | {JOINT: joint_error(errors, "_true")}

@@ -36,7 +36,7 @@ def read_run(root: Path) -> pd.DataFrame:
     jobs = jobs_of(read_profile(root.resolve().name))
     jobs = jobs.merge(measured.assign(job=names)[["job", "cpu_s"]], on="job")
     if jobs.empty:
-        raise InputError(f"{root}: none of its measured jobs is one of the profile's")
+        raise InputError(root, "none of its measured jobs is one of the profile's")
     return jobs
 
 

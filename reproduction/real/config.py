@@ -101,8 +101,9 @@ def parse_real_config(values: Mapping[str, Any]) -> RealConfig:
     given = {key: value for key, value in values.items() if value not in (None, "")}
     if "sequence" not in given:
         raise InputError(
-            "sequence: missing; say where the photographs are: make real SEVEN_SCENES=path"
-            " (docs/real.md)"
+            "sequence",
+            "missing",
+            "say where the photographs are: make real SEVEN_SCENES=path (docs/real.md)",
         )
     directions = given.get("directions")
     if isinstance(directions, Mapping):
@@ -112,4 +113,4 @@ def parse_real_config(values: Mapping[str, Any]) -> RealConfig:
     try:
         return RealConfig.model_validate(given)
     except ValidationError as error:
-        raise InputError(f"config/real.yaml: {describe(error)}") from error
+        raise InputError("config/real.yaml", describe(error)) from error

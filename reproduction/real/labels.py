@@ -97,8 +97,9 @@ def relabelled(frames: PosedFrames, names: Sequence[str], labels: dict[str, Arra
     lost = [name for name in names if name not in labels]
     if lost:
         raise InputError(
-            f"sfm_labels: have no pose of {lost[0]} ({len(lost)} of {len(names)} photographs); give"
-            " the files of this scene, training and test"
+            "sfm_labels",
+            f"have no pose of {lost[0]} ({len(lost)} of {len(names)} photographs)",
+            "give the files of this scene, training and test",
         )
     return replace(frames, world_from_cam=np.array([labels[name] for name in names]))
 

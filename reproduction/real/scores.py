@@ -82,7 +82,7 @@ def read_errors(poses: Path, truth: Truth) -> Errors:
     row = {photograph_name(name): i for i, name in enumerate(estimates.names)}
     lost = [name for name in truth.names if name not in row]
     if lost:
-        raise InputError(f"{poses}: has no line for {lost[0]}; localize all photographs again")
+        raise InputError(poses, f"has no line for {lost[0]}", "localize all photographs again")
     world_from_cam = found[[row[name] for name in truth.names]]
     good = np.asarray(np.isfinite(world_from_cam).all(axis=(1, 2)))
     position_m, orientation_deg = np.full(len(good), np.inf), np.full(len(good), np.inf)

@@ -35,7 +35,7 @@ def directions_of(scene: Path) -> tuple[str, ...]:
     """
     if not scene.is_dir():
         raise InputError(
-            f"{scene}: is not a folder; give that of a 7-Scenes scene, or of a sequence of one"
+            scene, "is not a folder", "give that of a 7-Scenes scene, or of a sequence of one"
         )
     if all(os.path.lexists(scene / file) for file in SPLIT_FILES.values()):
         sequences = [path for split in ("train", "test") for path in read_split(scene, split)]
@@ -60,8 +60,9 @@ def split_frames(scene: Path, direction: str) -> tuple[PosedFrames, PosedFrames]
         return _of_split(scene, "train", every, of), _of_split(scene, "test", every, of)
     if len(every) < 2 * BLOCKS:
         raise InputError(
-            f"{scene}: holds {len(every)} photographs; {2 * BLOCKS} or more are needed to scan some"
-            " and localize the others"
+            scene,
+            f"holds {len(every)} photographs; {2 * BLOCKS} or more are needed to scan some and"
+            " localize the others",
         )
     index = np.arange(len(every))
     half = index >= len(every) // 2

@@ -70,7 +70,7 @@ def write_pooled(folders: Sequence[Path], out: Path) -> None:
         InputError: there are fewer than two archives.
     """
     if len(folders) < 2:
-        raise InputError(f"{len(folders)} archives of replications: two are the least to pool")
+        raise InputError(f"{len(folders)} archives of replications", "two are the least to pool")
     archives = {folder.name: Archive(folder) for folder in folders}
     rows: Rows = []
     verdicts: dict[tuple[str, str], Verdict] = {}

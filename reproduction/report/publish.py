@@ -40,7 +40,7 @@ def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:
     """
     tables = sorted(p for p in (root / "tables").glob("*.*") if p.suffix in (".csv", ".tex"))
     if not tables:
-        raise InputError(f"{root}/tables: holds no tables; make the results first")
+        raise InputError(f"{root}/tables", "holds no tables", "make the results first")
     paths = [*tables, *_records(root), *_shown_figures(root, target, pages)]
     _check_provenance(root, paths)
     with atomic_directory(target, replace=True) as directory:
@@ -56,7 +56,7 @@ def _records(root: Path) -> list[Path]:
     if len(missing) == len(FINISHED):
         return []
     if missing:
-        raise InputError(f"{root / missing[0]}: missing; finish the run, then publish it")
+        raise InputError(root / missing[0], "missing", "finish the run, then publish it")
     return [root / name for name in FINISHED]
 
 
@@ -65,7 +65,7 @@ def _shown_figures(root: Path, target: Path, pages: Iterable[Path]) -> list[Path
     shown = {(name, page) for page in pages for name in pattern.findall(read_text(page))}
     for name, page in sorted(shown):
         if not (root / name).is_file():
-            raise InputError(f"{root / name}: missing, and {page} shows it; make it first")
+            raise InputError(root / name, f"missing, and {page} shows it", "make it first")
     return sorted({root / name for name, _ in shown})
 
 
@@ -77,7 +77,7 @@ def _check_provenance(root: Path, paths: Iterable[Path]) -> None:
     files = read_result(record, ["files"], "make the results again")["files"]
     for name, found in hashes(paths, root).items():
         if files.get(name, found) != found:
-            raise InputError(f"{root / name}: is not the file of {record}; finish the run")
+            raise InputError(root / name, f"is not the file of {record}", "finish the run")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

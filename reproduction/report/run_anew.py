@@ -33,7 +33,7 @@ def run_anew(root: Path) -> str:
     """
     tables = {name: keys for name, keys in KEYS.items() if _has(root, name)}
     if not tables:
-        raise InputError(f"{root}: has no table of training runs; publish again")
+        raise InputError(root, "has no table of training runs", "publish again")
     fresh = [run for run in published_runs(root.parent) if is_fresh(read_published(run))]
     records = []
     for table, keys in tables.items():

@@ -35,7 +35,9 @@ def save_light_shares(builder: str, seed: int, out_shares: Sequence[Path]) -> No
         InputError: the lights of this room cannot be switched.
     """
     if builder not in SWITCHED:
-        raise InputError(f"builder: the lights of {builder} cannot be switched; leave states out")
+        raise InputError(
+            "builder", f"the lights of {builder} cannot be switched", "leave states out"
+        )
     for group, mesh in light_shares(*BUILDERS[builder](seed)).items():
         save_glb(out_shares[0].with_name(f"light_{group}.glb"), mesh)
 
@@ -48,6 +50,6 @@ def build_scene(builder: str, seed: int) -> TexturedMesh:
     """
     if builder not in BUILDERS:
         raise InputError(
-            f"builder: no procedural scene '{builder}'; choose one of {sorted(BUILDERS)}"
+            "builder", f"no procedural scene '{builder}'", f"choose one of {sorted(BUILDERS)}"
         )
     return scanned_mesh(*BUILDERS[builder](seed))

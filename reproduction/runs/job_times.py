@@ -30,7 +30,7 @@ def read_measured(root: Path) -> pd.DataFrame:
     if paths:
         return with_present_names(read_jobs(paths, folder))
     if not table.is_file():
-        raise InputError(f"{root}: holds no benchmarks/**/*.tsv and no benchmarks.csv; name a run")
+        raise InputError(root, "holds no benchmarks/**/*.tsv and no benchmarks.csv", "name a run")
     return with_present_names(read_frame(table, SCHEMA, "name another run"))
 
 
@@ -67,5 +67,5 @@ def _read_tsv(path: Path, folder: Path) -> tuple[str, str, float, float, float]:
     stage, *rest = path.relative_to(folder).with_suffix("").parts
     rows = read_frame(path, BENCHMARK, REMEDY, sep="\t")
     if rows.empty:
-        raise InputError(f"{path}: has no rows; {REMEDY}")
+        raise InputError(path, "has no rows", REMEDY)
     return stage, "/".join(rest), *rows.iloc[-1]

@@ -31,8 +31,9 @@ def refuse_old_names(root: Path) -> None:
     """
     for path, _ in _old_names(root, BY_CAMERA):
         raise InputError(
-            f"{path}: is called otherwise now; rename it and its like with"
-            f" `python -m reproduction.runs.renamed {root}`"
+            path,
+            "is called otherwise now",
+            f"rename it and its like with `python -m reproduction.runs.renamed {root}`",
         )
 
 
@@ -51,7 +52,7 @@ def rename_results(root: Path) -> int:
     found = list(_old_names(root, BY_CAMERA + MEASURED_BY_CAMERA))
     for old, new in found:
         if new.exists():
-            raise InputError(f"{new}: is there beside {old}; remove the one that is not needed")
+            raise InputError(new, f"is there beside {old}", "remove the one that is not needed")
     for old, new in found:
         old.rename(new)
     return len(found)
@@ -93,7 +94,7 @@ def rename_named(arguments: Sequence[str]) -> None:
         raise InputError("name the results to rename, such as results/night")
     for root in roots:
         if not root.is_dir():
-            raise InputError(f"{root}: is not a directory; name results such as results/night")
+            raise InputError(root, "is not a directory", "name results such as results/night")
         print(f"{root}: {rename_results(root)} renamed")
 
 

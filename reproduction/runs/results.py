@@ -39,10 +39,10 @@ def read_result(path: Path, needed: Iterable[str], remedy: str, shape: Any = Non
     with read_as(path, "JSON", remedy=f"; {remedy}"):
         value = read_json(path)
     if not isinstance(value, dict):
-        raise InputError(f"{path}: must hold a mapping of keys; {remedy}")
+        raise InputError(path, "must hold a mapping of keys", remedy)
     absent = [key for key in needed if key not in value]
     if absent:
-        raise InputError(f"{path}: {', '.join(absent)} missing; {remedy}")
+        raise InputError(path, f"{', '.join(absent)} missing", remedy)
     return value if shape is None else shaped(path, value, shape, remedy)
 
 
@@ -64,7 +64,7 @@ def shaped(path: Path, value: Any, shape: Any, remedy: str) -> Any:
     try:
         return ADAPTER_OF(shape).validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
-        raise InputError(f"{path}: {why(error)}; {remedy}") from error
+        raise InputError(path, why(error), remedy) from error
 
 
 def unequal_leaves(a: Mapping[str, Any], b: Mapping[str, Any]) -> pd.DataFrame:

@@ -218,7 +218,7 @@ def read_label_ranking(path: Path) -> pd.DataFrame:
 def _read(path: Path, truth: PoseTable) -> PoseTable:
     predicted = read_predictions(path)
     if not np.array_equal(predicted.frame, truth.frame):
-        raise InputError(f"{path}: its frames are not those of the test set; predict again")
+        raise InputError(path, "its frames are not those of the test set", "predict again")
     return predicted
 
 

@@ -79,11 +79,11 @@ def _seconds_per_image(root: Path, run: str, n_seeds: int) -> float:
         measured = root / "benchmarks" / "train" / f"{run}/seed{seed}.tsv"
         job = read_jobs([measured] if measured.exists() else [], root / "benchmarks")
         if not job.cpu_s.sum() > 0.0:
-            raise InputError(f"{measured}: missing, or measured no time; train it again")
+            raise InputError(measured, "missing, or measured no time", "train it again")
         history = root / "runs" / f"{run}/seed{seed}" / "history.csv"
         images = read_frame(history, {"samples_seen": COUNT}, "train it again").samples_seen
         if images.empty or images.iloc[-1] <= 0:
-            raise InputError(f"{history}: shows no images; train it again")
+            raise InputError(history, "shows no images", "train it again")
         seconds, shown = seconds + job.cpu_s.sum(), shown + images.iloc[-1]
     return float(seconds / shown)
 
@@ -139,7 +139,7 @@ def collision_rows(root: Path, scene: str) -> pd.DataFrame:
     if curve.empty:  # nothing was decimated: `collection.collision_agreement` is null
         return pd.DataFrame()
     if (curve[["rays_per_s", "full_rays_per_s"]] <= 0).to_numpy().any():
-        raise InputError(f"{path}: needs speeds above 0; make the scene again")
+        raise InputError(path, "needs speeds above 0", "make the scene again")
     rays_per_s = curve.full_rays_per_s.median() * curve.rays_per_s / curve.full_rays_per_s
     return pd.DataFrame(
         {

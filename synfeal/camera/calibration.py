@@ -156,8 +156,9 @@ def read_calibration(path: Path, with_fisheye: bool = False) -> Calibration:
     calibration = _read(path)
     if calibration.projection is not None and not with_fisheye:
         raise InputError(
-            f"{path}: is a fisheye camera, and a perspective one is needed; undistort the images"
-            " first"
+            path,
+            "is a fisheye camera, and a perspective one is needed",
+            "undistort the images first",
         )
     return calibration
 
@@ -177,9 +178,9 @@ def _read(path: Path) -> Calibration:
             text = text.partition("\n")[2]
         return _from_mapping(_first_document(text))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError, JSONDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a calibration ({why(error)})") from error
+        raise InputError(path, f"cannot be read as a calibration ({why(error)})") from error
     except ValueError as error:
-        raise InputError(f"{path}: {why(error)}") from error
+        raise InputError(path, why(error)) from error
 
 
 def _first_document(text: str) -> Any:

@@ -11,7 +11,7 @@ from PIL import ExifTags, Image
 
 from synfeal.camera.calibration import Calibration, read_calibration
 from synfeal.camera.orientation import Orientation, turned, upright_size
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 
 PINHOLE = (0.0, 0.0, 0.0, 0.0, 0.0)
 FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
@@ -46,9 +46,13 @@ class PhotographCamera:
                 focal length is not a positive number.
         """
         if file is not None and focal_px is not None:
-            raise InputError("--focal: the calibration of --camera has one; give one of the two")
+            raise InputError(
+                Argument("focal_px"), "the calibration of `camera` has one", "give one of the two"
+            )
         if focal_px is not None and not (math.isfinite(focal_px) and focal_px > 0):
-            raise InputError(f"--focal: must be a positive number of pixels, found {focal_px:g}")
+            raise InputError(
+                Argument("focal_px"), f"must be a positive number of pixels, found {focal_px:g}"
+            )
         calibration = None if file is None else read_calibration(file)
         return cls(calibration, focal_px, exif, file)
 
@@ -112,7 +116,7 @@ class PhotographCamera:
                 " camera stored it, or give a calibration of turned pictures"
             )
             raise InputError(
-                f"{name}: its camera {self.file} {error}{remedy if lying else ''}"
+                name, f"its camera {self.file} {error}{remedy if lying else ''}"
             ) from error
 
 

@@ -52,7 +52,7 @@ def _read(path: Path) -> Capture:
     depths, confidences = _by_time(path / DEPTH, "*.png"), _by_time(path / CONFIDENCE, "*.png")
     pose_s, poses = _trajectory(path / "lowres_wide.traj")
     if not calibrations:
-        raise InputError(f"{path / 'lowres_wide_intrinsics'}: holds no .pincam; download it, too")
+        raise InputError(path / "lowres_wide_intrinsics", "holds no .pincam", "download it, too")
     calibration_s = np.array(list(calibrations))
     files = list(calibrations.values())
     frames, lost = [], 0
@@ -73,7 +73,7 @@ def _read(path: Path) -> Capture:
             )
         )
     if not frames:
-        raise InputError(f"{path}: no photograph has a pose and a calibration near in time")
+        raise InputError(path, "no photograph has a pose and a calibration near in time")
     notes = (f"{lost} of {len(photographs)} photographs have no pose near in time",) if lost else ()
     return Capture(path, FORMAT.name, tuple(frames), up=(0.0, 0.0, 1.0), notes=notes)
 
@@ -88,7 +88,7 @@ def _trajectory(path: Path) -> tuple[Array, Array]:
         if line.strip()
     ]
     if len(rows) < 2:
-        raise InputError(f"{path}: holds {len(rows)} poses; a trajectory has two or more")
+        raise InputError(path, f"holds {len(rows)} poses; a trajectory has two or more")
     table = np.array(rows)
     table = table[np.argsort(table[:, 0], kind="stable")]
     # A rotation vector and a translation, from the world to the camera.

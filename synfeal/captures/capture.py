@@ -101,12 +101,12 @@ def rigid_pose(matrix: ArrayLike | None, place: object) -> Array:
     with read_as(place, "a pose", TypeError, ValueError):
         pose = np.asarray(() if matrix is None else matrix, np.float64)
     if pose.shape not in ((3, 4), (4, 4)) or not np.isfinite(pose).all():
-        raise InputError(f"{place}: must hold a pose: a matrix of 3 or 4 rows and 4 columns")
+        raise InputError(place, "must hold a pose: a matrix of 3 or 4 rows and 4 columns")
     rotation = pose[:3, :3]
     u, stretch, vt = np.linalg.svd(rotation)
     if np.abs(stretch - 1.0).max() > RIGID_BOUND or np.linalg.det(rotation) < 0:
         raise InputError(
-            f"{place}: is not a rigid pose; the upper left 3x3 of its matrix must be a rotation"
+            place, "is not a rigid pose; the upper left 3x3 of its matrix must be a rotation"
         )
     return pose_matrix(u @ vt, pose[:3, 3])
 
@@ -119,7 +119,7 @@ def quat_pose(position_m: Sequence[float], quat_xyzw: Sequence[float], place: ob
     """
     values = np.array([*position_m, *quat_xyzw], np.float64)
     if not np.isfinite(values).all() or abs(float(np.linalg.norm(values[3:])) - 1.0) > 0.02:
-        raise InputError(f"{place}: must hold a position and a quaternion of length 1")
+        raise InputError(place, "must hold a position and a quaternion of length 1")
     return pose_from_quat(values[:3], values[[6, 3, 4, 5]])
 
 
@@ -161,7 +161,7 @@ def calibration(
             **values,
         )
     except (TypeError, ValueError) as error:
-        raise InputError(f"{place}: is no calibration ({error})") from error
+        raise InputError(place, f"is no calibration ({error})") from error
 
 
 def resized(camera: Calibration, width: int, height: int) -> Calibration:
@@ -193,7 +193,7 @@ def numbers(text: str, count: int, place: object) -> Array:
     with read_as(place, f"{count} numbers"):
         values = np.array(text.replace(",", " ").split(), np.float64)
     if values.shape != (count,) or not np.isfinite(values).all():
-        raise InputError(f"{place}: must hold {count} finite numbers, found {text.strip()[:60]!r}")
+        raise InputError(place, f"must hold {count} finite numbers, found {text.strip()[:60]!r}")
     return values
 
 

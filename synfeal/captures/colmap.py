@@ -44,12 +44,12 @@ def _model_of(path: Path) -> Path | None:
 def _read(path: Path) -> Capture:
     folder = _model_of(path)
     if folder is None:
-        raise InputError(f"{path}: holds no cameras and images, .bin or .txt, of a COLMAP model")
+        raise InputError(path, "holds no cameras and images, .bin or .txt, of a COLMAP model")
     with read_as(folder, "a model of COLMAP", OSError, ValueError, RuntimeError):
         model = _reconstruction(folder)
     registered = [model.images[i] for i in model.reg_image_ids()]
     if not registered:
-        raise InputError(f"{folder}: none of its images has a pose")
+        raise InputError(folder, "none of its images has a pose")
     names = _names(folder, registered)
     root = _photographs_of(path, folder, list(names.values()))
     cameras = {
@@ -61,7 +61,7 @@ def _read(path: Path) -> Capture:
         name = names[image.image_id]
         photograph = root / name
         if not lies_in(photograph, root):
-            raise InputError(f"{folder}: image '{name}' leads out of {root}")
+            raise InputError(folder, f"image '{name}' leads out of {root}")
         if not photograph.is_file():
             missing.append(name)
             continue
@@ -82,8 +82,10 @@ def _reconstruction(folder: Path) -> Any:
         points = folder / "points3D.bin"
         if not points.is_file():
             raise InputError(
-                f"{points}: missing; copy it, too, or convert the model to text, which does"
-                " without: colmap model_converter --output_type TXT"
+                points,
+                "missing",
+                "copy it, too, or convert the model to text, which does without: colmap"
+                " model_converter --output_type TXT",
             )
         return pycolmap.Reconstruction(folder)
     with tempfile.TemporaryDirectory() as name:
@@ -117,8 +119,9 @@ def _photographs_of(path: Path, folder: Path, names: list[str]) -> Path:
             if any((base / sub / name).is_file() for name in names[:20]):
                 return base / sub
     raise InputError(
-        f"{folder}: its images ({names[0]}, ...) are neither in {path / 'images'} nor in"
-        f" {path}; copy them to the first"
+        folder,
+        f"its images ({names[0]}, ...) are neither in {path / 'images'} nor in {path}",
+        "copy them to the first",
     )
 
 
@@ -137,7 +140,7 @@ def _camera(camera: Any, place: str) -> Calibration:
         )
     lens = (radial, *(values.get(name, 0.0) for name in ("k2", "p1", "p2", "k3")))
     if any(values.get(name) for name in ("k4", "k5", "k6", "omega", "sx1", "sy1")):
-        raise InputError(f"{place}: a lens of {model} is not read; undistort the images first")
+        raise InputError(place, f"a lens of {model} is not read", "undistort the images first")
     return calibration(camera.width, camera.height, pinhole, place, distortion=lens)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from synfeal.captures.capture import Capture
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 
 GROUP = "synfeal.captures"
 OWN = (
@@ -66,14 +66,15 @@ def capture_formats() -> dict[str, CaptureFormat]:
             other = entry.load()
         except (ImportError, AttributeError) as error:
             raise InputError(
-                f"entry point {entry.name} of {GROUP}: does not load ({error}); install its package"
-                " again, or remove it"
+                f"entry point {entry.name} of {GROUP}",
+                f"does not load ({error})",
+                "install its package again, or remove it",
             ) from error
         if not isinstance(other, CaptureFormat):
-            raise InputError(f"entry point {entry.name} of {GROUP}: is no CaptureFormat")
+            raise InputError(f"entry point {entry.name} of {GROUP}", "is no CaptureFormat")
         if other.name in found:
             raise InputError(
-                f"entry point {entry.name} of {GROUP}: a format {other.name} is there already"
+                f"entry point {entry.name} of {GROUP}", f"a format {other.name} is there already"
             )
         found[other.name] = other
     return found
@@ -86,15 +87,15 @@ def format_of(path: Path) -> CaptureFormat:
         InputError: It is in none, or in several.
     """
     if not path.exists():
-        raise InputError(f"{path}: is not there; give the folder or file of a capture")
+        raise InputError(path, "is not there", "give the folder or file of a capture")
     formats = capture_formats()
     fitting = [one for one in formats.values() if one.is_at(path)]
     if not fitting:
         marks = "; ".join(f"{one.title}: {one.marks}" for one in formats.values())
-        raise InputError(f"{path}: is no capture that is known. {marks}")
+        raise InputError(path, f"is no capture that is known. {marks}")
     if len(fitting) > 1:
         names = " or ".join(one.name for one in fitting)
-        raise InputError(f"{path}: may be a capture of {names}; say which with --format")
+        raise InputError(path, f"may be a capture of {names}", "say which with `format`")
     return fitting[0]
 
 
@@ -112,7 +113,7 @@ def read_capture(path: Path, name: str | None = None) -> Capture:
         return format_of(path).read(path)
     formats = capture_formats()
     if name not in formats:
-        raise InputError(f"--format: {name} is none of {', '.join(formats)}")
+        raise InputError(Argument("format"), f"{name} is none of {', '.join(formats)}")
     if not path.exists():
-        raise InputError(f"{path}: is not there; give the folder or file of a capture")
+        raise InputError(path, "is not there", "give the folder or file of a capture")
     return formats[name].read(path)

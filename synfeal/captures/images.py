@@ -55,8 +55,10 @@ def photograph_size(path: Path, width: int, height: int) -> tuple[int, int]:
         if abs(size[0] * height - size[1] * width) <= STRETCH * size[1] * width:
             return size
     raise InputError(
-        f"{path}: is of {stored[0]} x {stored[1]} pixels, its calibration of {width} x {height},"
-        " which are other proportions; give the photographs that were calibrated"
+        path,
+        f"is of {stored[0]} x {stored[1]} pixels, its calibration of {width} x {height}, which are"
+        " other proportions",
+        "give the photographs that were calibrated",
     )
 
 
@@ -108,6 +110,6 @@ def confident(
     """Return depth (H, W) with 0 where the confidence (H, W) is below the least."""
     if confidence.shape != depth_m.shape:
         raise InputError(
-            f"{place}: is of {confidence.shape[::-1]} pixels, its depth of {depth_m.shape[::-1]}"
+            place, f"is of {confidence.shape[::-1]} pixels, its depth of {depth_m.shape[::-1]}"
         )
     return np.where(confidence >= least, depth_m, np.float32(0.0))

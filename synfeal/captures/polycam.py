@@ -51,7 +51,7 @@ def _read(path: Path) -> Capture:
             continue
         frames.append(_frame(folder, file, photograph))
     if not frames:
-        raise InputError(f"{folder / f'{prefix}cameras'}: no camera has an image of its name")
+        raise InputError(folder / f"{prefix}cameras", "no camera has an image of its name")
     notes = [] if corrected else ["poses are those of the device, without loop closure"]
     if missing:
         notes.append(f"{len(missing)} cameras have no image ({missing[0]}, ...)")

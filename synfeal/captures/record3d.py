@@ -59,7 +59,7 @@ def _read(path: Path) -> Capture:
     with read_as(place, "the description of a recording", ValueError):
         values = json.loads(_member(path, "metadata"))
     if not isinstance(values, dict):
-        raise InputError(f"{place}: must hold a mapping of keys")
+        raise InputError(place, "must hold a mapping of keys")
     with read_as(place, "the description of a recording", KeyError, TypeError, ValueError):
         width, height = int(values["w"]), int(values["h"])
         poses = [[float(value) for value in pose] for pose in values["poses"]]
@@ -74,7 +74,7 @@ def _read(path: Path) -> Capture:
         if name not in names:
             continue
         if len(pose) != 7:
-            raise InputError(f"{place}: poses[{index}] must hold seven numbers")
+            raise InputError(place, f"poses[{index}] must hold seven numbers")
         camera = calibration(width, height, pinholes[index], place)
         world_from_gl = quat_pose(pose[4:], pose[:4], f"{place}: poses[{index}]")
         confidence = f"rgbd/{index}.conf"
@@ -92,7 +92,7 @@ def _read(path: Path) -> Capture:
             )
         )
     if not frames:
-        raise InputError(f"{path}: holds no rgbd/0.jpg; export the recording again")
+        raise InputError(path, "holds no rgbd/0.jpg", "export the recording again")
     lost = len(poses) - len(frames)
     notes = (f"{lost} of {len(poses)} poses have no photograph",) if lost else ()
     return Capture(path, FORMAT.name, tuple(frames), up=(0.0, 1.0, 0.0), notes=notes)
@@ -127,14 +127,14 @@ def _unpacked(path: Path, name: str, size: tuple[int, int], kind: Any) -> Any:
         import lzfse
     except ImportError as error:
         raise InputError(
-            f"{path}: depth of Record3D is compressed with LZFSE; pip install 'synfeal[captures]'"
+            path, "depth of Record3D is compressed with LZFSE", "pip install 'synfeal[captures]'"
         ) from error
     place = f"{path}: {name}"
     with read_as(place, "depth compressed with LZFSE", ValueError, lzfse.error, MemoryError):
         content = lzfse.decompress(_member(path, name))
     width, height = size
     if len(content) != width * height * np.dtype(kind).itemsize:
-        raise InputError(f"{place}: is not of {width}x{height} pixels as the metadata say")
+        raise InputError(place, f"is not of {width}x{height} pixels as the metadata say")
     return np.frombuffer(content, kind).reshape(height, width)
 
 

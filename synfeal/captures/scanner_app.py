@@ -41,7 +41,7 @@ def _read(path: Path) -> Capture:
         else:
             missing.append(photograph.name)
     if not frames:
-        raise InputError(f"{path}: no frame_00000.json has its frame_00000.jpg; export all data")
+        raise InputError(path, "no frame_00000.json has its frame_00000.jpg", "export all data")
     notes: tuple[str, ...] = ()
     if missing:
         # The app describes every frame of its depth camera and keeps a photograph of some.

@@ -38,7 +38,7 @@ def _read(path: Path) -> Capture:
     poses = {file.stem: file for file in (path / "pose").glob("*.txt") if file.stem.isdecimal()}
     stems = sorted(photographs.keys() & poses.keys(), key=int)
     if not stems:
-        raise InputError(f"{path}: no file of color has one of the same number in pose")
+        raise InputError(path, "no file of color has one of the same number in pose")
     size = image_size(photographs[stems[0]])
     color_matrix = _matrix(path / "intrinsic" / "intrinsic_color.txt")
     pinhole = color_matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
@@ -74,7 +74,7 @@ def _read(path: Path) -> Capture:
             )
         )
     if not frames:
-        raise InputError(f"{path / 'pose'}: none of the {len(stems)} poses is finite")
+        raise InputError(path / "pose", f"none of the {len(stems)} poses is finite")
     notes = (f"{lost} of {len(stems)} frames have no pose: tracking was lost",) if lost else ()
     return Capture(path, FORMAT.name, tuple(frames), depth_from_color, notes=notes)
 
@@ -86,7 +86,7 @@ def _pose(path: Path) -> Array | None:
     if values.shape == (16,) and not np.isfinite(values).all():
         return None
     if values.shape != (16,):
-        raise InputError(f"{path}: a pose is four rows of four numbers")
+        raise InputError(path, "a pose is four rows of four numbers")
     return rigid_pose(values.reshape(4, 4), path)
 
 

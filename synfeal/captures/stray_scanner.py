@@ -38,11 +38,11 @@ def _read(path: Path) -> Capture:
     table.columns = table.columns.str.strip()
     for name in ("timestamp", "frame", *POSE):
         if name not in table.columns:
-            raise InputError(f"{file}: has no column '{name}'; record the scene again")
+            raise InputError(file, f"has no column '{name}'", "record the scene again")
     with read_as(file, "a table of numbers", ValueError, TypeError):
         values = table.astype(np.float64)
     if not len(values):
-        raise InputError(f"{file}: holds no pose")
+        raise InputError(file, "holds no pose")
     video = Video(path / "rgb.mp4")
     shared = _matrix(path / "camera_matrix.csv")
     frames, lost = [], 0
@@ -56,7 +56,7 @@ def _read(path: Path) -> Capture:
         camera = calibration(video.width, video.height, pinhole, place)
         frames.append(_frame(path, video, number, entry, camera, place))
     if not frames:
-        raise InputError(f"{path / 'rgb.mp4'}: has no frame that {file.name} has a pose of")
+        raise InputError(path / "rgb.mp4", f"has no frame that {file.name} has a pose of")
     notes = (f"{lost} of {len(values)} poses have no frame in the video",) if lost else ()
     return Capture(path, FORMAT.name, tuple(frames), up=(0.0, 1.0, 0.0), notes=notes)
 
@@ -66,7 +66,7 @@ def _matrix(path: Path) -> list[float]:
     with read_as(path, "a camera matrix", OSError, ValueError):
         matrix = np.loadtxt(path, delimiter=",", dtype=np.float64)
     if matrix.shape != (3, 3):
-        raise InputError(f"{path}: must hold three rows of three numbers")
+        raise InputError(path, "must hold three rows of three numbers")
     return [float(matrix[0, 0]), float(matrix[1, 1]), float(matrix[0, 2]), float(matrix[1, 2])]
 
 

@@ -43,23 +43,23 @@ def _read(path: Path) -> Capture:
     with read_as(file, "a file of transforms"):
         values = read_json(file)
     if not isinstance(values, dict) or not isinstance(values.get("frames"), list):
-        raise InputError(f"{file}: must hold a list 'frames'; is it of nerfstudio?")
+        raise InputError(file, "must hold a list 'frames'; is it of nerfstudio?")
     if not values["frames"]:
-        raise InputError(f"{file}: its list 'frames' is empty")
+        raise InputError(file, "its list 'frames' is empty")
     with read_as(f"{file}: depth_unit_scale_factor", "a number", TypeError, ValueError):
         units_per_m = 1.0 / float(values.get("depth_unit_scale_factor", METRES_PER_UNIT))
     frames, missing = [], []
     for index, entry in enumerate(values["frames"]):
         place = f"{file}: frames[{index}]"
         if not isinstance(entry, dict):
-            raise InputError(f"{place}: must hold a mapping of keys")
+            raise InputError(place, "must hold a mapping of keys")
         photograph = _image_at(file, entry.get("file_path"), f"{place}.file_path")
         if photograph is None:
             missing.append(str(entry["file_path"]))
             continue
         frames.append(_frame(file, photograph, values, entry, units_per_m, place))
     if not frames:
-        raise InputError(f"{file}: {missing[0]} and all other images are missing; copy them, too")
+        raise InputError(file, f"{missing[0]} and all other images are missing", "copy them, too")
     frames.sort(key=lambda frame: frame.name)
     notes = (f"{len(missing)} images are missing ({missing[0]}, ...)",) if missing else ()
     return Capture(path, FORMAT.name, tuple(frames), up=None, notes=(*notes, *_world(values)))
@@ -75,10 +75,10 @@ def _world(values: Mapping[str, Any]) -> tuple[str, ...]:
 def _image_at(file: Path, name: Any, place: str) -> Path | None:
     """Return the image of a name, with the ending that older files leave out; None if missing."""
     if not isinstance(name, str) or not name:
-        raise InputError(f"{place}: must name an image")
+        raise InputError(place, "must name an image")
     found = file.parent / name
     if not lies_in(found, file.parent):
-        raise InputError(f"{place}: '{name}' leads out of the folder; copy the image into it")
+        raise InputError(place, f"'{name}' leads out of the folder", "copy the image into it")
     for candidate in (found, *(found.with_name(found.name + end) for end in (".png", ".jpg"))):
         if candidate.is_file():
             return candidate
@@ -104,7 +104,7 @@ def _frame(
     if entry.get("depth_file_path") is not None:
         depth_file = _image_at(file, entry["depth_file_path"], f"{place}.depth_file_path")
         if depth_file is None:
-            raise InputError(f"{place}.depth_file_path: {entry['depth_file_path']} is missing")
+            raise InputError(f"{place}.depth_file_path", f"{entry['depth_file_path']} is missing")
         depth_camera = resized(camera, *image_size(depth_file))
     return CapturedFrame(
         name=str(photograph.relative_to(file.parent)),
@@ -122,7 +122,7 @@ def _camera(values: Mapping[str, Any], size: tuple[int, int], place: str) -> Cal
     model = values.get("camera_model", "OPENCV")
     if model not in PERSPECTIVE + FISHEYE:
         raise InputError(
-            f"{place}: camera_model {model} is not read; undistort the images to PINHOLE first"
+            place, f"camera_model {model} is not read", "undistort the images to PINHOLE first"
         )
     with read_as(place, "a camera", TypeError, ValueError, KeyError):
         width, height = int(values.get("w", size[0])), int(values.get("h", size[1]))

@@ -35,8 +35,9 @@ def _read(path: Path) -> Capture:
     assert isinstance(first, Path)
     if (size := image_size(first)) != (sensor.color.width, sensor.color.height):
         raise InputError(
-            f"{first}: is of {size[0]}x{size[1]} pixels and nothing in the sequence says what its"
-            " camera is; scan it with --color-camera FILE"
+            first,
+            f"is of {size[0]}x{size[1]} pixels and nothing in the sequence says what its camera is",
+            "scan it with `color_camera=FILE`",
         )
     frames = []
     for stamp, photograph, depth_file, pose in zip(

@@ -60,7 +60,7 @@ def _read(path: Path) -> Capture:
 
 def _entry(info: Path, entries: dict[str, str], name: str) -> str:
     if name not in entries:
-        raise InputError(f"{info}: {name} is missing; copy the scene again")
+        raise InputError(info, f"{name} is missing", "copy the scene again")
     return entries[name]
 
 

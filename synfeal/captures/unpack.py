@@ -49,6 +49,8 @@ class Unpacked:
     """A capture as a posed sequence.
 
     Attributes:
+        format: Name of the format that the capture has.
+        n_captured: Number of frames of the capture.
         folder: Of ``frame-000000.color.jpg`` and so on, with ``capture.json``.
         color: Camera of all photographs.
         depth: Camera of all depth images; None where there are none.
@@ -56,6 +58,8 @@ class Unpacked:
         notes: What was left out; sentences for a person.
     """
 
+    format: str
+    n_captured: int
     folder: Path
     color: Calibration
     depth: Calibration | None
@@ -89,7 +93,7 @@ def unpack(
     frames, notes = _usable(capture)
     frames = frames[::stride]
     if len(frames) < 2:
-        raise InputError(f"{capture.path}: {len(frames)} of its frames can be used; two are needed")
+        raise InputError(capture.path, f"{len(frames)} of its frames can be used; two are needed")
     color = _at_most(common_camera([frame.camera for frame in frames]), longest_px)
     depth = None
     if frames[0].depth_camera is not None:
@@ -105,7 +109,15 @@ def unpack(
             on_frame()
         write_json(temporary / RECORD, _record(capture, frames, color, depth))
     notes = (*capture.notes, *notes, *far.notes())
-    return Unpacked(folder, color, depth, tuple(frame.name for frame in frames), notes)
+    return Unpacked(
+        format=capture.format,
+        n_captured=len(capture),
+        folder=folder,
+        color=color,
+        depth=depth,
+        names=tuple(frame.name for frame in frames),
+        notes=notes,
+    )
 
 
 def _at_most(camera: Calibration, longest_px: int) -> Calibration:
@@ -203,8 +215,9 @@ def _write_depth(frame: CapturedFrame, camera: Calibration, stem: Path, far: _Fa
     own = _depth_camera(frame)
     if depth_m.shape != (own.height, own.width):
         raise InputError(
-            f"{frame.name}: its depth is of {depth_m.shape[1]}x{depth_m.shape[0]} pixels, that of"
-            f" the first frames of {own.width}x{own.height}; are all of one capture?"
+            frame.name,
+            f"its depth is of {depth_m.shape[1]}x{depth_m.shape[0]} pixels, that of the first"
+            f" frames of {own.width}x{own.height}; are all of one capture?",
         )
     if not _is_kept(own, camera):
         depth_m = redrawn_depth(depth_m, own, camera)
@@ -249,7 +262,7 @@ def read_capture_record(folder: Path) -> dict[str, Any] | None:
     with read_as(path, "the record of a capture"):
         values = read_json(path)
     if not isinstance(values, dict) or not isinstance(values.get("camera"), dict):
-        raise InputError(f"{path}: is no record of a capture; unpack it again")
+        raise InputError(path, "is no record of a capture", "unpack it again")
     return values
 
 

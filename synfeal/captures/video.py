@@ -20,7 +20,7 @@ class Video:
 
     def __init__(self, path: Path) -> None:
         if not path.is_file():
-            raise InputError(f"{path}: missing; copy the recording again")
+            raise InputError(path, "missing", "copy the recording again")
         self._path = path
         self._opened: Any = None
         self._next = 0
@@ -31,7 +31,7 @@ class Video:
         self._count = int(opened.get(cv2.CAP_PROP_FRAME_COUNT))
         opened.release()
         if min(self.width, self.height, self._count) < 1:
-            raise InputError(f"{path}: holds no frame that can be decoded")
+            raise InputError(path, "holds no frame that can be decoded")
 
     def __len__(self) -> int:
         return self._count
@@ -42,7 +42,7 @@ class Video:
         # Calibration and depth are of the pixels as they are stored.
         opened.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
         if not opened.isOpened():
-            raise InputError(f"{self._path}: cannot be read as a video")
+            raise InputError(self._path, "cannot be read as a video")
         return opened
 
     def read(self, number: int) -> Colors:
@@ -57,7 +57,7 @@ class Video:
             self._next += 1
         done, image = self._opened.read()
         if self._next != number or not done:
-            raise InputError(f"{self._path}: ends before frame {number}; copy the recording again")
+            raise InputError(self._path, f"ends before frame {number}", "copy the recording again")
         self._next += 1
         return np.ascontiguousarray(image[..., ::-1])
 
@@ -67,6 +67,6 @@ def _opencv(path: Path) -> Any:
         import cv2
     except ImportError as error:
         raise InputError(
-            f"{path}: videos are decoded by OpenCV; pip install 'synfeal[captures]'"
+            path, "videos are decoded by OpenCV", "pip install 'synfeal[captures]'"
         ) from error
     return cv2

@@ -6,8 +6,7 @@ import argparse
 import logging
 from pathlib import Path
 
-from synfeal.cli.options import command, option
-from synfeal.errors import InputError
+from synfeal.cli.options import command, keywords, option
 
 log = logging.getLogger("synfeal")
 
@@ -23,6 +22,7 @@ log = logging.getLogger("synfeal")
         metavar="NAME",
     ),
     option("--stride", "take every N-th frame (1)", type=int, default=1, metavar="N"),
+    function="synfeal.api:unpack",
     was={"--every": "--stride"},
 )
 def unpack(arguments: argparse.Namespace) -> None:
@@ -30,17 +30,12 @@ def unpack(arguments: argparse.Namespace) -> None:
 
     The sequence is what scan, map and collect --like read, without further options.
     """
-    from synfeal.captures.formats import capture_formats, read_capture
-    from synfeal.captures.unpack import unpack as write
-    from synfeal.records.progress import Progress
+    from synfeal.api import unpack as write
+    from synfeal.captures.formats import capture_formats
 
-    if arguments.stride < 1:
-        raise InputError(f"--stride: must be at least 1, found {arguments.stride}")
-    capture = read_capture(arguments.capture, arguments.format)
-    title = capture_formats()[capture.format].title
-    print(f"{arguments.capture}: {len(capture)} frames of {title}")
-    with Progress(-(-len(capture) // arguments.stride), "unpacked") as progress:
-        done = write(capture, arguments.out, stride=arguments.stride, on_frame=progress.update)
+    done = write(**keywords(arguments, unpack))
+    title = capture_formats()[done.format].title
+    print(f"{arguments.capture}: {done.n_captured} frames of {title}")
     for note in done.notes:
         log.warning("%s: %s", arguments.capture, note)
     color, depth = done.color, done.depth

@@ -72,10 +72,10 @@ def validate(arguments: argparse.Namespace) -> None:
     from synfeal.validation.run import validate as run_checks
 
     checks = run_checks(arguments.dataset, arguments.camera, arguments.every_pair)
-    print(report(arguments.dataset, checks), end="", flush=True)
+    print(arguments.wording.text(report(arguments.dataset, checks)), end="", flush=True)
     errors = error_lines(checks)
     for line in errors[:-1]:
-        print(f"error: {' '.join(line.split())}", file=sys.stderr)
+        print(f"error: {' '.join(arguments.wording.text(line).split())}", file=sys.stderr)
     if errors:
         raise InputError(errors[-1])
 

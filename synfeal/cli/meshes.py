@@ -168,7 +168,8 @@ def inspect(arguments: argparse.Namespace) -> None:
 
     out = arguments.out or Path(f"{arguments.mesh.stem}-inspect")
     place = checked(PlaceConfig, given(arguments, PlaceConfig))
-    text = inspect_mesh(place.scene, out, "unit_m" in place.model_fields_set)
+    unit_is_given, wording = "unit_m" in place.model_fields_set, arguments.wording.text
+    text = inspect_mesh(place.scene, out, unit_is_given, wording=wording)
     print(f"{out}: inspect.html, inspect.png and inspect.json\n")
     print(text)
 

@@ -12,8 +12,9 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from synfeal.config.collect import Shown
+from synfeal.cli.wording import in_flags
 from synfeal.config.flags import UNITS, flag_of
+from synfeal.config.shown import Shown, default_text
 
 log = logging.getLogger("synfeal")
 
@@ -115,7 +116,8 @@ def _details(name: str, field: FieldInfo) -> dict[str, Any]:
     """Return the arguments of argparse for a field."""
     shown = next((each for each in field.metadata if isinstance(each, Shown)), Shown())
     kind = _plain(field.annotation)
-    text, default = field.description or "", shown.default or _default_text(field)
+    text = in_flags(field.description or "", flag_of)
+    default = in_flags(shown.default or default_text(field), flag_of)
     details: dict[str, Any] = {"dest": name, "help": f"{text} ({default})" if default else text}
     if field.is_required():
         details["required"] = True
@@ -146,15 +148,6 @@ def _plain(annotation: Any) -> Any:
         some = [each for each in get_args(annotation) if each is not NoneType]
         return _plain(some[0])
     return annotation
-
-
-def _default_text(field: FieldInfo) -> str:
-    value = field.get_default()
-    if field.is_required() or isinstance(value, bool) or value is None or value == ():
-        return ""
-    if isinstance(value, tuple):
-        return " ".join(f"{each:g}" for each in value)
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def given(arguments: argparse.Namespace, *models: type[BaseModel]) -> dict[str, Any]:

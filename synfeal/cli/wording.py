@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,28 @@ if TYPE_CHECKING:
 # An argument of Python in a text, alone or with a value: `unit_m`, `depth_scale=5000`.
 MARKED = re.compile(r"`([a-z][a-z0-9_]*)(?:=([^`]*))?`")
 PYTHON_ALONE = re.compile(r"[(),\"']")  # signs of a value that a shell does without
+
+
+def in_flags(text: str, flag_of: Callable[[str], str | None]) -> str:
+    """Write the arguments that a text names as they are given to a command.
+
+    Args:
+        text: Text with arguments of Python between backticks.
+        flag_of: Flag, or place, of an argument; None for words that are none.
+    """
+
+    def written(found: re.Match[str]) -> str:
+        argument, value = found.groups()
+        flag = flag_of(argument)
+        if flag is None:
+            return found[0]
+        if value == "False":
+            return f"--no-{flag.removeprefix('--')}"
+        if value is None or value == "True":
+            return flag
+        return f"{flag} {PYTHON_ALONE.sub('', value)}"
+
+    return MARKED.sub(written, text)
 
 
 class Wording:
@@ -40,18 +62,7 @@ class Wording:
 
     def text(self, text: str) -> str:
         """Write the arguments that a text names as they are given to a command."""
-        return MARKED.sub(self._written, text)
-
-    def _written(self, found: re.Match[str]) -> str:
-        argument, value = found.groups()
-        if argument not in self._flags:  # a word of something else
-            return found[0]
-        flag = self._flags[argument]
-        if value == "False":
-            return f"--no-{flag.removeprefix('--')}"
-        if value is None or value == "True":
-            return flag
-        return f"{flag} {PYTHON_ALONE.sub('', value)}"
+        return in_flags(text, self._flags.get)
 
     @contextmanager
     def of_errors(self) -> Iterator[None]:

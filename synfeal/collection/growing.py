@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from synfeal.errors import InputError, why
+from synfeal.errors import Argument, InputError, why
 from synfeal.records.files import dotted, read_json, refuse_existing, write_json, writing_to
 from synfeal.records.lock import only_command, remove_unfinished
 
@@ -44,9 +44,7 @@ def growing(out: Path, settings: Mapping[str, Any]) -> Iterator[Path | None]:
     refuse_existing(out)
     part = out.with_name(f"{out.name}.part")
     if part.is_dir() and not os.path.lexists(part / WORK / SETTINGS) and _holds_files(part):
-        raise InputError(
-            f"{part}: is not an unfinished data set; delete it or choose another --out"
-        )
+        raise InputError(part, "is not an unfinished data set", "delete it or choose another `out`")
     try:
         with writing_to(part, lambda: _kept(part)):
             (part / WORK).mkdir(parents=True, exist_ok=True)
@@ -74,10 +72,12 @@ def _place_of(out: Path) -> Path:
     try:
         place = out.resolve()
         if place.is_mount():
-            raise InputError(f"--out: {out} is a whole file system; name a directory in it")
+            raise InputError(
+                Argument("out"), f"{out} is a whole file system", "name a directory in it"
+            )
     except (OSError, RuntimeError) as error:  # a name that is too long; links in a loop
         reason = getattr(error, "strerror", None) or "its links lead in a circle"
-        raise InputError(f"--out: {out}: {reason}; choose another directory") from error
+        raise InputError(Argument("out"), f"{out}: {reason}", "choose another directory") from error
     return place
 
 
@@ -106,16 +106,17 @@ def _check_settings(part: Path, settings: Mapping[str, Any]) -> None:
             raise ValueError("holds no mapping")
     except (OSError, ValueError) as error:
         raise InputError(
-            f"{path}: cannot be read ({why(error)}); delete {part} to start anew"
+            path, f"cannot be read ({why(error)})", f"delete {part} to start anew"
         ) from error
     before, now = dotted(found), dotted(settings)
     differing = [
-        f"{key} was {before.get(key)}, is {now.get(key)}"
+        f"`{key}` was {before.get(key)}, is {now.get(key)}"
         for key in {**now, **before}
         if before.get(key) != now.get(key)
     ]
     if differing:
         raise InputError(
-            f"{path}: is of another data set ({'; '.join(differing)}); go on with the options of"
-            f" that one, or delete {part} to start anew"
+            path,
+            f"is of another data set ({'; '.join(differing)})",
+            f"go on with the options of that one, or delete {part} to start anew",
         )

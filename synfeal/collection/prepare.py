@@ -153,8 +153,9 @@ def build_or_load(scene: SceneConfig, seed: int, called: str) -> TexturedMesh:
         found = file_sha256(path)
         if found != scene.sha256:
             raise InputError(
-                f"{called}: sha256: {path} has {found}, expected {scene.sha256}; download it"
-                " again, or correct the hash if another version is meant"
+                called,
+                f"sha256: {path} has {found}, expected {scene.sha256}",
+                "download it again, or correct the hash if another version is meant",
             )
     return load_mesh(path, scene.up_axis, scene.unit_m)
 
@@ -195,8 +196,10 @@ def cluttered(
     for number, each in enumerate(found):
         if each is None:
             raise InputError(
-                f"{key}: no place left for {kinds[number % len(kinds)][0]}, object {number + 1} of"
-                f" {clutter.count}; give fewer or smaller ones"
+                key,
+                f"no place left for {kinds[number % len(kinds)][0]}, object {number + 1} of"
+                f" {clutter.count}",
+                "give fewer or smaller ones",
             )
         parts += each[0]
         places.append(each[1])

@@ -34,7 +34,7 @@ from synfeal.dataset.render_sequence import resolved
 from synfeal.dataset.sevenscenes import Split, sequences_of
 from synfeal.dataset.world import read_scan_record, write_sequence_from_world
 from synfeal.effects.scene import crowd_of
-from synfeal.errors import InputError, SettingError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.poses import moved_right
 from synfeal.mesh.checks import color_range, shows_one_color
 from synfeal.mesh.load import is_y_up, load_mesh
@@ -70,15 +70,18 @@ def refuse_invisible(
         rgb = " ".join(f"{level:.0f}" for level in color_range(mesh)[1])
         found = f" (on reading: {'; '.join(mesh.findings[:2])})" if mesh.findings else ""
         raise InputError(
-            f"{name}: is of one colour, {rgb} of 255, and so would be every image{found}; put its"
-            " texture files (of an OBJ also the .mtl) where it names them, export it with its"
-            " texture, or give the shade headlight, which shows its shape"
+            name,
+            f"is of one colour, {rgb} of 255, and so would be every image{found}",
+            "put its texture files (of an OBJ also the .mtl) where it names them, export it with"
+            ' its texture, or give `shade="headlight"`, which shows its shape',
         )
     diagonal_m = float(np.linalg.norm(mesh.bounds_m[1] - mesh.bounds_m[0]))
     if diagonal_m <= camera.near_m:
         raise InputError(
-            f"{name}: the mesh is {diagonal_m:.3g} m across, and cameras see nothing nearer than"
-            f" near_m ({camera.near_m:g} m); give the metres per unit of the file with --unit-m"
+            name,
+            f"the mesh is {diagonal_m:.3g} m across, and cameras see nothing nearer than near_m"
+            f" ({camera.near_m:g} m)",
+            "give the metres per unit of the file with `unit_m`",
         )
 
 
@@ -99,9 +102,10 @@ def refuse_blank(
         if share > REFUSE_ABOVE:
             size_m = " x ".join(f"{side:.3g}" for side in np.diff(caster.bounds_m, axis=0)[0])
             raise InputError(
-                f"{name}: {share:.0%} of the pixels of the {split} frames would be empty: the"
-                f" mesh spans {size_m} m, and cameras see nothing farther than far_m"
-                f" ({camera.far_m:g} m) or outside; {_way_in(scene)}"
+                name,
+                f"{share:.0%} of the pixels of the {split} frames would be empty: the mesh spans"
+                f" {size_m} m, and cameras see nothing farther than far_m ({camera.far_m:g} m) or"
+                f" outside; {_way_in(scene)}",
             )
         if share > WARN_ABOVE:
             log.warning(
@@ -126,7 +130,7 @@ def warn_of_walls(
         if blocked:
             log.warning(
                 "%s: in %d of %d %s frames a surface is between the two cameras; give"
-                " --min-clearance %g",
+                " `min_clearance_m=%g`",
                 name,
                 blocked,
                 len(plan),
@@ -137,17 +141,17 @@ def warn_of_walls(
 
 def _way_in(scene: SceneConfig) -> str:
     if scene.sampling_box is None:
-        return "give --unit-m or --box (synfeal inspect suggests them)"
-    return "give another --unit-m, or a --box inside the mesh"
+        return "give `unit_m` or `box` (synfeal inspect suggests them)"
+    return "give another `unit_m`, or a `box` inside the mesh"
 
 
 def _way_to_see_more(scene: SceneConfig) -> str:
     """Name what has not been tried yet."""
     if scene.sampling_box is None:
-        return "a --box keeps them inside (synfeal inspect suggests one)"
+        return "a `box` keeps them inside (synfeal inspect suggests one)"
     if (scene.min_seen or 0.0) < SEES_MOST:
-        return f"--min-seen {SEES_MOST:g} refuses views of that"
-    return "narrower bounds of --pitch, or a mesh with fewer holes, show less of that"
+        return f"`min_seen={SEES_MOST:g}` refuses views of that"
+    return "narrower bounds of `pitch_deg`, or a mesh with fewer holes, show less of that"
 
 
 FEW_PATHS = 5
@@ -159,7 +163,7 @@ def warn_of_few_paths(plan: PoseTable, split: Split) -> None:
     if paths < FEW_PATHS:
         log.warning(
             "the %d %s frames lie on %s: they show little of the scene; more frames, a larger"
-            " --spacing or --mode random show more",
+            ' `spacing_m` or `mode="random"` show more',
             len(plan),
             {"train": "training", "test": "test"}[split],
             "one straight path" if paths == 1 else f"{paths} straight paths",
@@ -235,7 +239,7 @@ def collect(config: CollectConfig, out: Path, cores: int = 1) -> None:
             attempt with other settings stands in the way, or a file cannot be written.
     """
     if cores < 1:
-        raise SettingError("cores", f"must be at least 1, found {cores}")
+        raise InputError(Argument("cores"), f"must be at least 1, found {cores}")
     job = CollectJob(config.changed(backend=resolved(config.render).backend), out)
     with growing(job.out, job.settings) as part:
         if part is None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from synfeal.config.collect import CollectConfig, LikeConfig, checked
-from synfeal.errors import SettingError
+from synfeal.errors import Argument, InputError
 from synfeal.planning.like import MIN_SEEN, MIN_VIEW_DISTANCE_M, Like, like_trajectory, resized
 
 MARGIN_M, MARGIN_DEG = 0.2, 10.0
@@ -51,7 +51,9 @@ def collect_config(options: Mapping[str, Any]) -> tuple[CollectConfig, Like | No
     }
     if not given.keys() & {"camera", "fov_deg", "projection"}:
         if like.camera is None:
-            raise SettingError("like", f"{wanted.like}: nothing says what its camera is; give one")
+            raise InputError(
+                Argument("like"), f"{wanted.like}: nothing says what its camera is", "give one"
+            )
         camera = resized(like.camera, chosen.pop("width", None), chosen.pop("height", None))
         chosen["camera"] = camera.model_copy(update={"stereo_baseline_m": None})
     return checked(CollectConfig, chosen), like

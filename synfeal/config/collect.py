@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -43,6 +43,7 @@ from synfeal.config.dataset import (
 )
 from synfeal.config.effects import EffectsConfig
 from synfeal.config.load import check_mesh_file, describe, read_yaml
+from synfeal.config.shown import Shown
 from synfeal.config.types import (
     MOST_FRAMES,
     Channel,
@@ -55,7 +56,7 @@ from synfeal.config.types import (
     Seed,
     Strict,
 )
-from synfeal.errors import InputError, SettingError
+from synfeal.errors import Argument, InputError
 
 Model = TypeVar("Model", bound=BaseModel)
 SCENE = "scan"  # what records and seeds call the scene of a collection
@@ -71,18 +72,6 @@ KEYS = {
     "stereo_baseline_m": "stereo_m",
     **dict.fromkeys(("fx", "fy", "cx", "cy", "distortion"), "camera"),
 }
-
-
-class Shown(NamedTuple):
-    """How the help of the command line shows a field.
-
-    Attributes:
-        values: Names of its values.
-        default: Its default in words, where that depends on other fields.
-    """
-
-    values: tuple[str, ...] = ()
-    default: str | None = None
 
 
 def _like(model: type[BaseModel], key: str, description: str) -> Any:
@@ -168,10 +157,10 @@ class ViewConfig(Strict):
         tuple[Finite, Finite, Finite, Finite] | None, Shown(("K1", "K2", "K3", "K4"), "0 0 0 0")
     ] = Field(None, description="distortion coefficients of a fisheye, as in OpenCV")
     width: Annotated[
-        Annotated[int, Field(ge=16, le=8192)] | None, Shown(("PX",), "640, or that of --camera")
+        Annotated[int, Field(ge=16, le=8192)] | None, Shown(("PX",), "640, or that of `camera`")
     ] = Field(None, description="image width, pixels")
     height: Annotated[
-        Annotated[int, Field(ge=16, le=8192)] | None, Shown(("PX",), "480, or that of --camera")
+        Annotated[int, Field(ge=16, le=8192)] | None, Shown(("PX",), "480, or that of `camera`")
     ] = Field(None, description="image height, pixels")
     fov_deg: Annotated[
         Annotated[float, Field(gt=1, le=360)] | None, Shown(("DEG",), "60; fisheye 180")
@@ -255,10 +244,10 @@ class CollectConfig(ViewConfig, PlaceConfig):
     min_view_distance_m: NonNegative = _like(
         SceneConfig, "min_view_distance_m", "least free view at the end of a path, metres"
     )
-    min_seen: Annotated[Fraction | None, Shown(("SHARE",), "0; 0.85 with --like")] = Field(
+    min_seen: Annotated[Fraction | None, Shown(("SHARE",), "0; 0.85 with `like`")] = Field(
         None, description="least share of the view that the mesh fills"
     )
-    min_clearance_m: Annotated[NonNegative | None, Shown(("M",), "0; that of --stereo")] = Field(
+    min_clearance_m: Annotated[NonNegative | None, Shown(("M",), "0; that of `stereo_m`")] = Field(
         None, description="least distance of cameras from surfaces, metres"
     )
     min_path_m: NonNegative = _like(
@@ -270,11 +259,11 @@ class CollectConfig(ViewConfig, PlaceConfig):
     mode: Mode = _like(
         CollectionConfig,
         "mode",
-        "straight paths, independent (random) poses, or those of --poses",
+        "straight paths, independent (random) poses, or those of `poses`",
     )
     poses: Path | None = Field(
         None,
-        description="with --mode repeat: data set, 7-Scenes frames, pose table (.csv) or TUM"
+        description='with `mode="repeat"`: data set, 7-Scenes frames, pose table (.csv) or TUM'
         " trajectory",
     )
     stereo_m: Annotated[StereoBaseline | None, Shown(("BASELINE_M",))] = Field(
@@ -395,14 +384,14 @@ class LikeConfig(Strict):
         " independent (docs/scanning.md)",
     )
     like_range: Annotated[tuple[int, int] | None, Shown(("START", "STOP"), "all")] = Field(
-        None, description="with --like: first frame and one past the last"
+        None, description="with `like`: first frame and one past the last"
     )
     margin_m: Annotated[Annotated[float, Field(ge=0, le=1000)] | None, Shown(("M",), "0.2")] = (
-        Field(None, description="with --like: metres added around the box")
+        Field(None, description="with `like`: metres added around the box")
     )
     angle_margin_deg: Annotated[
         Annotated[float, Field(ge=0, le=360)] | None, Shown(("DEG",), "10")
-    ] = Field(None, description="with --like: degrees added around the angles")
+    ] = Field(None, description="with `like`: degrees added around the angles")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -419,17 +408,19 @@ def checked(model: type[Model], values: Mapping[str, Any]) -> Model:
     """Build a model from settings, of which None stands for the default.
 
     Raises:
-        SettingError: One cannot be used, or is none of the model's.
+        InputError: One cannot be used, or is none of the model's.
     """
     given = {name: value for name, value in values.items() if value is not None}
     if unknown := sorted(set(given) - set(model.model_fields)):
-        raise SettingError(unknown[0], f"no such option; there are {', '.join(model.model_fields)}")
+        raise InputError(
+            Argument(unknown[0]), f"no such option; there are {', '.join(model.model_fields)}"
+        )
     try:
         return model.model_validate(given)
     except ValidationError as error:
         where, _, problem = describe(error).partition(": ")
         field, _, below = where.partition(".")
-        raise SettingError(field, ": ".join(filter(None, (below, problem)))) from error
+        raise InputError(Argument(field), ": ".join(filter(None, (below, problem)))) from error
 
 
 def _part(model: type[Model], values: Mapping[str, Any], names: Mapping[str, str] = KEYS) -> Model:

@@ -21,7 +21,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
         value = yaml.load(path.read_text(encoding="utf-8"), PlainLoader)  # noqa: S506 (a SafeLoader)
     if not isinstance(value, dict):
         found = "nothing" if value is None else _shortened(reprlib.repr(value))
-        raise InputError(f"{path}: must hold a mapping of keys, found {found}")
+        raise InputError(path, f"must hold a mapping of keys, found {found}")
     return value
 
 
@@ -67,8 +67,8 @@ def check_mesh_file(path: Path, field: str) -> None:
         missing = isinstance(error, FileNotFoundError | NotADirectoryError)
         why = "does not exist" if missing else f"cannot be read ({error.strerror})"
         raise InputError(
-            f"{field}: {path} {why}; put the mesh there or change the path (see {DOCUMENTATION})"
+            field, f"{path} {why}", f"put the mesh there or change the path (see {DOCUMENTATION})"
         ) from error
     if not stat.S_ISREG(mode):
         kind = "a directory" if stat.S_ISDIR(mode) else "no plain file"
-        raise InputError(f"{field}: {path} is {kind}; name the mesh file itself")
+        raise InputError(field, f"{path} is {kind}", "name the mesh file itself")

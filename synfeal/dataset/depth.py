@@ -64,7 +64,7 @@ def _read_stored(
     stored = np.asarray(image)
     if not image.mode.startswith("I") or stored.min() < 0 or stored.max() > INVALID:
         raise InputError(
-            f"{path}: must be a 16-bit grey image of depth, not of mode {image.mode}{remedy}"
+            path, f"must be a 16-bit grey image of depth, not of mode {image.mode}{remedy}"
         )
     return stored.astype(np.uint16, copy=False), _units_in(image, path)
 
@@ -90,7 +90,7 @@ def _units_in(image: Image.Image, path: FrameFile) -> float | None:
     with read_as(path, "a depth image", TypeError, ValueError):
         units_per_m = float(said)
     if not 0 < units_per_m < np.inf:
-        raise InputError(f"{path}: {UNITS_KEY}: must be above 0, found {said[:40]!r}")
+        raise InputError(path, f"{UNITS_KEY}: must be above 0, found {said[:40]!r}")
     return units_per_m
 
 

@@ -69,7 +69,7 @@ class PosedDepth:
         camera: Perspective camera of the depth images.
         depth_from_cam: Rigid motion (4, 4) from the colour camera to that of depth.
         units_per_m: What a depth of one metre is stored as.
-        options: Options by which the command takes other poses or units: ``--convention``,
+        options: Options by which the command takes other poses or units: ``convention``,
             ``--depth-scale``.
     """
 
@@ -227,12 +227,12 @@ def _axes_of(axes: CameraAxes) -> Callable[[Array], Array]:
 
 def _readings(options: frozenset[str]) -> tuple[tuple[Change, ...], ...]:
     """List other ways to read poses, one group for each thing that may be meant otherwise."""
-    can_choose = "--convention" in options
+    can_choose = "convention" in options
     inverted = "the poses are cam_from_world: " + (
-        "give --convention cam_from_world" if can_choose else "invert each of them"
+        'give `convention="cam_from_world"`' if can_choose else "invert each of them"
     )
     opengl = f"the camera's axes are {DESCRIPTIONS['opengl']}: " + (
-        "give --convention opengl"
+        'give `convention="opengl"`'
         if can_choose
         else "multiply each pose by diag(1, -1, -1, 1) from the right"
     )
@@ -255,7 +255,7 @@ def _scales(posed: PosedDepth, sample: Sample) -> dict[str, float]:
     """Name factors by which depths may be wrong, relative to positions."""
     usual = float(np.median(np.concatenate(sample.point_depth_m))) >= LEAST_USUAL_M
     units = UNITS_PER_M if usual else (WHOLE_METRES_PER_M, *UNITS_PER_M)
-    remedy = "give --depth-scale {0:g}" if "--depth-scale" in posed.options else "store {1}"
+    remedy = "give `depth_scale={0:g}`" if "depth_scale" in posed.options else "store {1}"
     found = {
         f"a metre of depth is stored as {value:g}: "
         + remedy.format(value, "it in millimetres"): posed.units_per_m / value

@@ -93,14 +93,15 @@ def decode_image(
     image = _decoded(content, place, formats, most_pixels, remedy)
     if size is not None and image.size != size:
         raise InputError(
-            f"{place}: is of {image.width} x {image.height} pixels, the camera of {size[0]} x"
-            f" {size[1]}{remedy or '; all images of a camera must be of its size'}"
+            place,
+            f"is of {image.width} x {image.height} pixels, the camera of {size[0]} x"
+            f" {size[1]}{remedy or '; all images of a camera must be of its size'}",
         )
     if mode is None or mode == image.mode:
         return image
     if image.mode not in EIGHT_BIT:
         raise InputError(
-            f"{place}: holds pixels of mode {image.mode}, such as depth, not 8-bit colours{remedy}"
+            place, f"holds pixels of mode {image.mode}, such as depth, not 8-bit colours{remedy}"
         )
     if "transparency" in image.info:  # a palette's: Pillow knows this way only
         image = image.convert("RGBA")
@@ -206,7 +207,7 @@ def _content(path: FrameFile, remedy: str = "") -> bytes:
         try:
             return path.read_bytes()
         except FileNotFoundError as error:
-            raise InputError(f"{path}: missing{remedy}") from error
+            raise InputError(path, f"missing{remedy}") from error
 
 
 def _decoded(
@@ -215,7 +216,7 @@ def _decoded(
     """Decode every row; our own PNG files by the fast codec."""
     if content[4:8] == b"ftyp" and content[8:12] in HEIF_BRANDS:
         if not reads_heif():
-            raise InputError(f"{place}: is HEIC, which needs pillow-heif: {HEIF_REMEDY}")
+            raise InputError(place, f"is HEIC, which needs pillow-heif: {HEIF_REMEDY}")
     elif formats is not None:
         formats = tuple(name for name in formats if name != HEIF)  # which Pillow may not know
     if formats is None or "PNG" in formats:

@@ -55,4 +55,4 @@ def _config(path: Path, values: object) -> CameraConfig:
     try:
         return CameraConfig.model_validate(values)
     except ValidationError as error:
-        raise InputError(f"{path}: camera: {describe(error)}") from error
+        raise InputError(path, f"camera: {describe(error)}") from error

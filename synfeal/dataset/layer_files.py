@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.images import read_image
 from synfeal.effects.scene import placed_objects
-from synfeal.errors import InputError, read_as
+from synfeal.errors import Argument, InputError, read_as
 from synfeal.mesh.instances import Instance, number_instances
 from synfeal.mesh.model import TexturedMesh
 from synfeal.records.files import read_json, write_json
@@ -63,7 +63,7 @@ def read_normals(path: FrameFile) -> Normals:
     """
     image = read_image(path)
     if image.mode != "RGB":
-        raise InputError(f"{path}: must be an 8-bit RGB image of normals, not of mode {image.mode}")
+        raise InputError(path, f"must be an 8-bit RGB image of normals, not of mode {image.mode}")
     return normals_of_pixels(np.asarray(image))
 
 
@@ -75,7 +75,7 @@ def read_mask(path: FrameFile) -> NDArray[np.uint16]:
     """
     image = read_image(path)
     if not image.mode.startswith("I"):
-        raise InputError(f"{path}: must be a 16-bit grey image of ids, not of mode {image.mode}")
+        raise InputError(path, f"must be a 16-bit grey image of ids, not of mode {image.mode}")
     return np.asarray(image).astype(np.uint16)
 
 
@@ -92,8 +92,9 @@ def refuse_many_instances(mesh: TexturedMesh, most_objects: int, name: str) -> N
     """
     if len(mesh.parts) + most_objects > MOST_IDS:
         raise InputError(
-            f"--masks: {name} has {len(mesh.parts)} parts, and 16-bit masks tell {MOST_IDS} apart;"
-            " join its parts, or leave masks out"
+            Argument("masks"),
+            f"{name} has {len(mesh.parts)} parts, and 16-bit masks tell {MOST_IDS} apart",
+            "join its parts, or leave masks out",
         )
 
 

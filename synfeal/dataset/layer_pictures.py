@@ -49,7 +49,7 @@ class Layer(NamedTuple):
     Attributes:
         kind: Ending of its files.
         picture: Makes a picture of one.
-        collected_with: Options of ``synfeal collect`` that make it.
+        collected_with: Arguments of ``collect`` that make it.
     """
 
     kind: str
@@ -60,9 +60,9 @@ class Layer(NamedTuple):
 # By the names of ``synfeal preview --show``.
 PICTURES: Mapping[str, Layer] = {
     "color": Layer(COLOR, _image, ""),
-    "depth": Layer(DEPTH, _depth, "--depth"),
-    "normals": Layer(NORMAL, _image, "--normals"),
-    "masks": Layer(MASK, lambda file: mask_picture(read_mask(file)), "--masks"),
-    "right": Layer(RIGHT_COLOR, _image, "--stereo BASELINE_M"),
-    "right-depth": Layer(RIGHT_DEPTH, _depth, "--depth --stereo BASELINE_M"),
+    "depth": Layer(DEPTH, _depth, "`depth=True`"),
+    "normals": Layer(NORMAL, _image, "`normals=True`"),
+    "masks": Layer(MASK, lambda file: mask_picture(read_mask(file)), "`masks=True`"),
+    "right": Layer(RIGHT_COLOR, _image, "`stereo_m=BASELINE_M`"),
+    "right-depth": Layer(RIGHT_DEPTH, _depth, "`depth=True` and `stereo_m=BASELINE_M`"),
 }

@@ -21,5 +21,5 @@ def read_manifest(dataset: Path) -> dict[str, Any]:
     with read_as(path, "a manifest"):
         manifest = read_json(path)
     if not isinstance(manifest, dict):
-        raise InputError(f"{path}: cannot be read as a manifest (no JSON object)")
+        raise InputError(path, "cannot be read as a manifest (no JSON object)")
     return manifest

@@ -61,7 +61,7 @@ def join_packed(parts: list[Path], out: Path) -> None:
     input_px = arrays[0].shape[1]
     for path, array in zip(parts, arrays, strict=True):
         if array.shape[1] != input_px:
-            raise InputError(f"{path}: holds frames of {array.shape[1]} px, others {input_px} px")
+            raise InputError(path, f"holds frames of {array.shape[1]} px, others {input_px} px")
     header = np.lib.format.header_data_from_array_1_0(arrays[0])
     header["shape"] = (sum(map(len, arrays)), *arrays[0].shape[1:])
     with atomic_path(out) as temporary, temporary.open("wb") as joined:
@@ -79,7 +79,7 @@ def read_packed(path: Path) -> np.memmap[Any, np.dtype[np.uint8]]:
         frames: np.memmap[Any, np.dtype[np.uint8]] = np.lib.format.open_memmap(path, mode="r")
     side = frames.shape[1] if frames.ndim == 4 else 0
     if frames.dtype != np.uint8 or frames.shape[1:] != (side, side, 3) or np.isfortran(frames):
-        raise InputError(f"{path}: holds {frames.dtype} {frames.shape}, not packed frames")
+        raise InputError(path, f"holds {frames.dtype} {frames.shape}, not packed frames")
     return frames
 
 

@@ -52,11 +52,11 @@ def read_colmap(folder: Path) -> PoseList:
     """
     both = [name for name in MODELS if (folder / name).is_file()]
     if len(both) > 1:
-        raise InputError(f"{folder}: holds images.txt and images.bin; leave one of them")
+        raise InputError(folder, "holds images.txt and images.bin", "leave one of them")
     path = folder / both[0]
     poses = _text_poses(path) if path.name == TEXT else _binary_poses(path)
     if not poses:
-        raise InputError(f"{path}: this COLMAP model has no image with a pose")
+        raise InputError(path, "this COLMAP model has no image with a pose")
     return _estimates("a COLMAP model", sorted(poses, key=lambda pose: pose.name))
 
 
@@ -95,7 +95,7 @@ def image_lines(path: Path) -> list[tuple[str, NamedPose]]:
             found.append((line, pose))
         elif line.strip() and not is_points:
             raise InputError(
-                f"{path}: line {number} is no image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
+                path, f"line {number} is no image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
             )
         is_points = pose is not None
     return found
@@ -162,11 +162,12 @@ def read_kapture(path: Path) -> PoseList:
     """
     records = path.with_name(RECORDS)
     if path.name == RECORDS:
-        raise InputError(f"{path}: names images, not poses; give {TRAJECTORIES} beside it")
+        raise InputError(path, "names images, not poses", f"give {TRAJECTORIES} beside it")
     if not records.is_file():
         raise InputError(
-            f"{path}: is kapture's, whose images {RECORDS} beside it names, which is missing; copy"
-            " it there"
+            path,
+            f"is kapture's, whose images {RECORDS} beside it names, which is missing",
+            "copy it there",
         )
     images = {(cells[0], cells[1]): cells[2] for _, cells in _kapture_rows(records, 3)}
     poses = []
@@ -178,8 +179,9 @@ def read_kapture(path: Path) -> PoseList:
         poses.append(NamedPose(name, tuple(numbers[:4]), tuple(numbers[4:]), f"line {line}"))
     if not poses:
         raise InputError(
-            f"{path}: none of its times and devices is of an image in {RECORDS}; poses of a rig"
-            " (rigs.txt) are not read, give those of its cameras"
+            path,
+            f"none of its times and devices is of an image in {RECORDS}; poses of a rig (rigs.txt)"
+            " are not read, give those of its cameras",
         )
     return _estimates("kapture trajectories", poses)
 
@@ -192,5 +194,5 @@ def _kapture_rows(path: Path, n_cells: int) -> Iterator[tuple[int, list[str]]]:
             continue
         cells = [cell.strip() for cell in line.split(",", n_cells - 1)]
         if len(cells) != n_cells:
-            raise InputError(f"{path}: line {number} has {len(cells)} cells, kapture {n_cells}")
+            raise InputError(path, f"line {number} has {len(cells)} cells, kapture {n_cells}")
         yield number, cells

@@ -130,13 +130,14 @@ def read_pose_table(path: Path, any_frames: bool = False) -> PoseTable:
     if len(off) and not any_frames:
         row = int(off[0])
         raise InputError(
-            f"{path}: line {row + 2} is of frame {frame[row]} where frame {row} must be; a row is"
-            " missing, doubled or out of order: make the table again"
+            path,
+            f"line {row + 2} is of frame {frame[row]} where frame {row} must be; a row is missing,"
+            " doubled or out of order: make the table again",
         )
     flags = values[:, len(COLUMNS) :]
     if not np.isin(flags, (0, 1)).all():
         bad = int(np.argmin(np.isin(flags, (0, 1)).all(axis=1)))
-        raise InputError(f"{path}: row {bad + 2}: {REGISTERED} must be 0 or 1; make it again")
+        raise InputError(path, f"row {bad + 2}: {REGISTERED} must be 0 or 1", "make it again")
     registered = flags[:, 0] == 1 if flags.shape[1] else None
     return PoseTable(frame, straight_path, values[:, 2:5], values[:, 5:9], registered=registered)
 
@@ -145,7 +146,7 @@ def read_frames(path: Path, start: int, stop: int) -> PoseTable:
     """Read the frames ``start`` to ``stop`` (exclusive) of a pose table that has as many."""
     table = read_pose_table(path)
     if len(table) < stop:
-        raise InputError(f"{path}: holds {len(table)} poses, {stop} are needed; make it again")
+        raise InputError(path, f"holds {len(table)} poses, {stop} are needed", "make it again")
     return table.between(start, stop)
 
 
@@ -154,7 +155,7 @@ def whole_numbers(values: NDArray[np.float64], path: Path) -> NDArray[np.int64]:
     good = ((values >= 0) & (values < 2**53) & (values == np.floor(values))).all(axis=1)
     if not good.all():
         row = int(np.argmin(good)) + 2
-        raise InputError(f"{path}: row {row} must begin with whole numbers, 0 or above")
+        raise InputError(path, f"row {row} must begin with whole numbers, 0 or above")
     return values.astype(np.int64)
 
 
@@ -180,8 +181,9 @@ def check_places(
     if off.any():
         bad = int(np.argmax(off))
         raise InputError(
-            f"{path}: line {line_of[bad]} holds a position of {distance_m[bad]:.3g} m, which is no"
-            " place; repair the line"
+            path,
+            f"line {line_of[bad]} holds a position of {distance_m[bad]:.3g} m, which is no place;"
+            " repair the line",
         )
 
 
@@ -202,8 +204,9 @@ def check_unit(quat_wxyz: NDArray[np.float64], path: Path, line_of: NDArray[np.i
     if off.any():
         bad = int(np.argmax(off))
         raise InputError(
-            f"{path}: line {line_of[bad]} holds a quaternion of length {length[bad]:.3g};"
-            " a rotation has length 1"
+            path,
+            f"line {line_of[bad]} holds a quaternion of length {length[bad]:.3g}; a rotation has"
+            " length 1",
         )
 
 

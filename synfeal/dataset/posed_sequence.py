@@ -107,15 +107,16 @@ def read_posed_sequence(path: Path, frames: slice | None = None) -> PosedFrames:
             no frame in the range.
     """
     if not path.is_dir() and not (is_archive(path) and path.is_file()):
-        raise InputError(f"{path}: is not a folder; give the folder of a posed sequence")
+        raise InputError(path, "is not a folder", "give the folder of a posed sequence")
     if path.is_dir() and is_tum(path):
         return _chosen(_read_tum(path), frames, path)
     listed = _listed(path)
     chosen = listed if frames is None else listed[frames]
     if not chosen:
         raise InputError(
-            f"{path}: has {len(listed)} frames, none of them in the range asked for; frames are"
-            " counted from 0"
+            path,
+            f"has {len(listed)} frames, none of them in the range asked for; frames are counted"
+            " from 0",
         )
     return _read_frames(chosen)
 
@@ -143,8 +144,9 @@ class _Entry:
             endings = {"color": "color.png (or .jpg)", "depth": "depth.png", "pose": "pose.txt"}
             missing = frame_file(self.sequence, f"frame-{self.number}.{endings[kind]}")
             raise InputError(
-                f"{missing}: missing, other files of this frame are there; copy the sequence again"
-                " or delete the rest of the frame"
+                missing,
+                "missing, other files of this frame are there",
+                "copy the sequence again or delete the rest of the frame",
             )
         return frame_file(self.sequence, self.files[kind])
 
@@ -161,15 +163,16 @@ def _listed(path: Path) -> list[_Entry]:
         sequences = [item for item in sequences if item.is_dir() or is_archive(item)]
         if entries and sequences:
             raise InputError(
-                f"{path}: holds frames and {sequences[0].name}; give one of its sequences"
+                path, f"holds frames and {sequences[0].name}", "give one of its sequences"
             )
         sequences.sort(key=lambda item: int(item.stem[4:]))
         for sequence in sequences:
             entries += _entries(sequence, f"{sequence.stem}/")
     if not entries:
         raise InputError(
-            f"{path}: holds no frame-000000.color.png, no seq-01 and no {RGB_LIST} with"
-            f" {TRAJECTORY}; give the folder of a posed sequence"
+            path,
+            f"holds no frame-000000.color.png, no seq-01 and no {RGB_LIST} with {TRAJECTORY}",
+            "give the folder of a posed sequence",
         )
     return entries
 
@@ -187,8 +190,9 @@ def _entries(sequence: Path, prefix: str) -> list[_Entry]:
         files = found.setdefault(match[1], {})
         if kind in files:
             raise InputError(
-                f"{frame_file(sequence, name)}: this frame has a second colour image,"
-                f" {files[kind]}; delete one of the two"
+                frame_file(sequence, name),
+                f"this frame has a second colour image, {files[kind]}",
+                "delete one of the two",
             )
         files[kind] = name
     numbers = sorted(found, key=lambda number: (int(number), number))
@@ -205,7 +209,7 @@ def _read_frames(entries: Sequence[_Entry]) -> PosedFrames:
     if len(kept) < len(entries):
         lost = next(entry for entry, pose in zip(entries, poses, strict=True) if pose is None)
         if not kept:
-            raise InputError(f"{lost.file('pose')}: is not finite, and neither is any other pose")
+            raise InputError(lost.file("pose"), "is not finite, and neither is any other pose")
         log.warning(
             "%s: is not finite; left out, and so are %d others of %d frames",
             lost.file("pose"),
@@ -236,8 +240,9 @@ def _chosen(sequence: PosedFrames, frames: slice | None, path: Path) -> PosedFra
     chosen = sequence if frames is None else sequence[frames]
     if not len(chosen):
         raise InputError(
-            f"{path}: has {len(sequence)} frames, none of them in the range asked for; frames are"
-            " counted from 0"
+            path,
+            f"has {len(sequence)} frames, none of them in the range asked for; frames are counted"
+            " from 0",
         )
     return chosen
 
@@ -254,7 +259,7 @@ def _read_tum(path: Path) -> PosedFrames:
         depth = [files[index] for index in nearest]
     trajectory = read_trajectory(path / TRAJECTORY).by_time(path / TRAJECTORY)
     if len(trajectory) < 2:
-        raise InputError(f"{path / TRAJECTORY}: holds one pose; a trajectory has two or more")
+        raise InputError(path / TRAJECTORY, "holds one pose; a trajectory has two or more")
     pose_s, poses = trajectory.stamps_s, trajectory.world_from_cam
     after = np.searchsorted(pose_s, color_s).clip(1, len(pose_s) - 1)
     gap_s = np.maximum(color_s - pose_s[after - 1], pose_s[after] - color_s)
@@ -265,8 +270,9 @@ def _read_tum(path: Path) -> PosedFrames:
     kept = np.flatnonzero(keep)
     if not len(kept):
         raise InputError(
-            f"{path / TRAJECTORY}: no photograph of {RGB_LIST} was taken within its times; are the"
-            " three lists of one sequence?"
+            path / TRAJECTORY,
+            f"no photograph of {RGB_LIST} was taken within its times; are the three lists of one"
+            " sequence?",
         )
     if len(kept) < len(color):
         log.warning(
@@ -280,7 +286,7 @@ def _read_tum(path: Path) -> PosedFrames:
     found = [interpolate(poses[after[i] - 1], poses[after[i]], fraction[i])[0] for i in kept]
     for file in (file for i in kept for file in (color[i], depth[i])):
         if file is not None and not file.is_file():
-            raise InputError(f"{file}: missing, a list names it; copy the sequence again")
+            raise InputError(file, "missing, a list names it", "copy the sequence again")
     return PosedFrames(
         names=tuple(color[i].stem for i in kept),
         color=tuple(color[i] for i in kept),
@@ -306,10 +312,12 @@ def _read_list(path: Path, name: str) -> tuple[Array, list[Path]]:
             stamps.append(float(stamp))
         if not lies_in(path / file, path):
             raise InputError(
-                f"{path / name}: line {number} names '{file}', which leads out of the sequence's"
-                " folder and is not read; copy it there"
+                path / name,
+                f"line {number} names '{file}', which leads out of the sequence's folder and is"
+                " not read",
+                "copy it there",
             )
         files.append(path / file)
     if not files:
-        raise InputError(f"{path / name}: lists no images")
+        raise InputError(path / name, "lists no images")
     return np.array(stamps), files

@@ -120,19 +120,19 @@ def read_pose_list(path: Path, file_format: FormatName | None = None) -> PoseLis
     if path.is_dir() or path.name in MODELS:
         found = _from_directory(path) if path.is_dir() else read_colmap(path.parent)
         if file_format not in (None, _name_of(found)):
-            raise InputError(f"{path}: is {found.kind}, not {file_format}; correct --format")
+            raise InputError(path, f"is {found.kind}, not {file_format}", "correct `format`")
         return found
     if not os.path.lexists(path):
-        raise InputError(f"{path}: missing; give a file of poses, or a directory")
+        raise InputError(path, "missing", "give a file of poses, or a directory")
     with read_as(path, "poses"):
         text = path.read_text(encoding="utf-8-sig")
     if file_format == "kapture" or (file_format is None and is_kapture(text)):
         return read_kapture(path)
     rows = _rows(text.replace(",", " ") if file_format == "tum" else text)
     if not rows:
-        raise InputError(f"{path}: holds no poses")
+        raise InputError(path, "holds no poses")
     if file_format in ("7scenes", "colmap"):
-        raise InputError(f"{path}: is a file; a {file_format} set of poses is a directory")
+        raise InputError(path, f"is a file; a {file_format} set of poses is a directory")
     first = rows[0][1][0]
     if file_format in ("csv", "euroc") or (file_format is None and "," in first):
         whole = is_number(first.partition(",")[0]) and file_format != "csv"
@@ -186,9 +186,10 @@ class Trajectory:
         differing = np.flatnonzero(~is_new[1:] & (moved_m > SAME_PLACE_M))
         if len(differing):
             raise InputError(
-                f"{path}: the time {self.stamps_s[order[differing[0]]]:.6f} has two different poses"
+                path,
+                f"the time {self.stamps_s[order[differing[0]]]:.6f} has two different poses"
                 f" ({len(order)} poses at {len(kept)} times); are two runs in one file, or times"
-                " rounded?"
+                " rounded?",
             )
         return Trajectory(self.stamps_s[kept], self.position_m[kept], self.quat_wxyz[kept])
 
@@ -206,12 +207,12 @@ def read_trajectory(path: Path) -> Trajectory:
         text = path.read_text(encoding="utf-8-sig")
     rows = _rows("\n".join(line.partition("#")[0] for line in text.splitlines()))
     if not rows:
-        raise InputError(f"{path}: holds no poses; a trajectory has lines {TUM_ROW}")
+        raise InputError(path, f"holds no poses; a trajectory has lines {TUM_ROW}")
     for line, row in rows:
         if any("," in cell for cell in row):
-            raise InputError(f"{path}: line {line} has commas; {TUM_ROW} are separated by blanks")
+            raise InputError(path, f"line {line} has commas; {TUM_ROW} are separated by blanks")
         if len(row) != 8 or not all(map(is_number, row)) or not np.isfinite(_floats(row)).all():
-            raise InputError(f"{path}: line {line} must hold eight finite numbers: {TUM_ROW}")
+            raise InputError(path, f"line {line} must hold eight finite numbers: {TUM_ROW}")
     found = read_lines(path, rows, "tum")
     lines = np.array([line for line, _ in rows])
     check_places(found.translation, path, lines)
@@ -243,7 +244,7 @@ def _from_directory(path: Path) -> PoseList:
     kapture = [p for p in (path, path / "sensors") if (p / TRAJECTORIES).is_file()]
     found = [*models, *kapture, *([path / "seq-*"] if sequences else []), *lists[:1]]
     if len(found) > 1:
-        raise InputError(f"{path}: holds poses twice, {found[0]} and {found[1]}; name one of them")
+        raise InputError(path, f"holds poses twice, {found[0]} and {found[1]}", "name one of them")
     if models:
         return read_colmap(models[0])
     if kapture:
@@ -253,8 +254,10 @@ def _from_directory(path: Path) -> PoseList:
     if lists:
         return read_tum_sequences(lists)
     raise InputError(
-        f"{path}: holds no seq-01/frame-000000.pose.txt, no seq-01.txt (TUM) and no images.txt or"
-        " images.bin (COLMAP); name the file that has the poses"
+        path,
+        "holds no seq-01/frame-000000.pose.txt, no seq-01.txt (TUM) and no images.txt or"
+        " images.bin (COLMAP)",
+        "name the file that has the poses",
     )
 
 
@@ -266,7 +269,7 @@ def read_sevenscenes(path: Path) -> PoseList:
         (s.name, frame) for s in sequences for frame in s.frames if frame.number in s.numbers[POSE]
     ]
     if not frames:
-        raise InputError(f"{path}: its sequences hold no frame-XXXXXX.pose.txt")
+        raise InputError(path, "its sequences hold no frame-XXXXXX.pose.txt")
     matrices = np.array([read_pose(frame.path(POSE)) for _, frame in frames])
     return PoseList(
         "a 7-Scenes tree",
@@ -286,12 +289,13 @@ def read_csv(path: Path, text: str) -> PoseList:
     known = (COLUMNS, (*COLUMNS, IMAGE), found, (*found, *SUPPORT), (*found, *SEEN))
     if table.header not in known:
         raise InputError(
-            f"{path}: the header must be {','.join(COLUMNS)} or image,{','.join(COLUMNS[2:])},"
-            f" found '{','.join(table.header)[:80]}'"
+            path,
+            f"the header must be {','.join(COLUMNS)} or image,{','.join(COLUMNS[2:])}, found"
+            f" '{','.join(table.header)[:80]}'",
         )
     table.check_rows()
     if not table.rows:
-        raise InputError(f"{path}: holds no poses below its header")
+        raise InputError(path, "holds no poses below its header")
     may_be_empty = table.header[-1] == SUPPORT[-1]  # no pose, no numbers
     values = table.numbers(COLUMNS[2:], may_be_empty)
     named = IMAGE in table.header
@@ -328,21 +332,24 @@ def read_euroc(path: Path, text: str, told: bool = True) -> PoseList:
     for place, (_, row) in zip(places, rows, strict=True):
         if len(row) < 8:
             raise InputError(
-                f"{path}: {place} has {len(row)} columns; EuRoC's are a time in nanoseconds, three"
-                " of the position, four of the quaternion, and more"
+                path,
+                f"{place} has {len(row)} columns; EuRoC's are a time in nanoseconds, three of the"
+                " position, four of the quaternion, and more",
             )
         if not row[0].isdecimal():
             raise InputError(
-                f"{path}: {place}: the time '{row[0][:40]}' must be whole nanoseconds (EuRoC); a"
-                " TUM trajectory has seconds, and with commas needs --format tum"
+                f"{path}: {place}",
+                f"the time '{row[0][:40]}' must be whole nanoseconds (EuRoC)",
+                'a TUM trajectory has seconds, and with commas needs `format="tum"`',
             )
     values = _numbers(path, places, [row[1:8] for _, row in rows])
     stamps_ns = [int(row[0]) for _, row in rows]
     if not told and max(stamps_ns) < LEAST_STAMP_NS and all(len(row) == 8 for _, row in rows):
         raise InputError(
-            f"{path}: {places[0]}: eight numbers, a time of {rows[0][1][0][:40]} and commas may be"
-            " EuRoC's (nanoseconds, quaternion wxyz) or TUM's (seconds, xyzw); say which with"
-            " --format euroc or tum"
+            f"{path}: {places[0]}",
+            f"eight numbers, a time of {rows[0][1][0][:40]} and commas may be EuRoC's (nanoseconds,"
+            " quaternion wxyz) or TUM's (seconds, xyzw)",
+            'say which with `format="euroc"` or tum',
         )
     return PoseList(
         "a EuRoC trajectory",
@@ -371,7 +378,7 @@ def read_lines(path: Path, rows: Rows, file_format: FormatName | None = None) ->
     columns = line_format.n_numbers + (line_format.frame_key == "name")
     for line, row in rows:
         if len(row) != columns:
-            raise InputError(f"{path}: line {line} has {len(row)} columns, those above {columns}")
+            raise InputError(path, f"line {line} has {len(row)} columns, those above {columns}")
     places = [f"line {i}" for i, _ in rows]
     if line_format.frame_key == "index":
         return _of_matrices(path, line_format, places, [row for _, row in rows])
@@ -406,8 +413,9 @@ def _line_format(
         columns = told.n_numbers + (told.frame_key == "name")
         if len(row) != columns:
             raise InputError(
-                f"{path}: line {line} has {len(row)} columns, {file_format} has {columns};"
-                " correct --format, or leave it out"
+                path,
+                f"line {line} has {len(row)} columns, {file_format} has {columns}",
+                "correct `format`, or leave it out",
             )
         return told
     named = not is_number(row[0])
@@ -417,7 +425,7 @@ def _line_format(
     count = f"a name and {len(row) - 1} numbers" if named else f"{len(row)} numbers and no name"
     held = ", ".join(known.holds for known in LINE_FORMATS.values())
     raise InputError(
-        f"{path}: line {line} has {count}; known are {held}, or a CSV header {','.join(COLUMNS)}"
+        path, f"line {line} has {count}; known are {held}, or a CSV header {','.join(COLUMNS)}"
     )
 
 
@@ -452,7 +460,7 @@ def read_tum_sequences(paths: Sequence[Path]) -> PoseList:
     parts = [read_pose_list(path) for path in paths]
     odd = [p for p, part in zip(paths, parts, strict=True) if part.convention != TUM]
     if odd:
-        raise InputError(f"{odd[0]}: must be a TUM trajectory, as its name and directory say")
+        raise InputError(odd[0], "must be a TUM trajectory, as its name and directory say")
     return PoseList(
         "TUM trajectories",
         TUM,
@@ -468,5 +476,5 @@ def _numbers(path: Path, places: Sequence[str], cells: Sequence[Sequence[str]]) 
     for place, row in zip(places, cells, strict=True):
         bad = [cell for cell in row if not is_number(cell)]
         if bad:
-            raise InputError(f"{path}: {place}: '{bad[0][:40]}' is not a number")
+            raise InputError(path, f"{place}: '{bad[0][:40]}' is not a number")
     return np.array(cells, np.float64)

@@ -18,7 +18,7 @@ from synfeal.dataset.layer_pictures import PICTURES
 from synfeal.dataset.sequence_listing import SequenceListing
 from synfeal.dataset.sevenscenes import Split
 from synfeal.dataset.split_frames import read_split_frames
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.records.files import atomic_path, lies_in
 
 TILE_WIDTH_PX, TITLE_PX = 320, 16
@@ -50,12 +50,16 @@ def write_preview(
             encoder.
     """
     if n_frames < 1:
-        raise InputError(f"--frames: must be at least 1, found {n_frames}")
+        raise InputError(Argument("frames"), f"must be at least 1, found {n_frames}")
     if not 0.01 <= fps <= 50:
-        raise InputError(f"--fps: must be 0.01 to 50, which a GIF can show, found {fps:g}")
+        raise InputError(
+            Argument("fps"), f"must be 0.01 to 50, which a GIF can show, found {fps:g}"
+        )
     write = WRITERS.get(out.suffix.lower())
     if write is None:
-        raise InputError(f"--out: {out}: a preview is a GIF or MP4; end its name in .gif or .mp4")
+        raise InputError(
+            Argument("out"), f"{out}: a preview is a GIF or MP4", "end its name in .gif or .mp4"
+        )
     if write is _write_mp4:
         encoder()  # missing, it is to be missed before any frame is read
     columns = []
@@ -66,14 +70,15 @@ def write_preview(
             layer = PICTURES[name]
             if name != "color" and not any(s.numbers[layer.kind] for s in frames.sequences):
                 raise InputError(
-                    f"--show: {dataset} has no {name}; collect it with {layer.collected_with}, or"
-                    " leave it out"
+                    Argument("show"),
+                    f"{dataset} has no {name}",
+                    f"collect it with {layer.collected_with}, or leave it out",
                 )
             title = dataset.resolve().name + (f" {name}" if len(show) > 1 else "")
             columns.append(Column(title, frames.files(layer.kind)[:n_frames], layer.picture))
     pictures = list(_rows(columns))
     if not pictures:
-        raise InputError(f"{datasets[0]}: has no {split} frames; choose the other --split")
+        raise InputError(datasets[0], f"has no {split} frames", "choose the other `split`")
     with atomic_path(out) as temporary:
         write(pictures, fps, temporary)
     return len(pictures)
@@ -84,7 +89,9 @@ def _refuse_among_frames(out: Path, sequences: Iterable[SequenceListing]) -> Non
     for sequence in sequences:
         if lies_in(out, sequence.path):
             raise InputError(
-                f"--out: {out} lies among the frames of {sequence.path}; choose a place beside them"
+                Argument("out"),
+                f"{out} lies among the frames of {sequence.path}",
+                "choose a place beside them",
             )
 
 
@@ -100,8 +107,9 @@ def encoder() -> str:
         found = get_ffmpeg_exe()
     if found is None:
         raise InputError(
-            "--out: MP4 needs ffmpeg, which is not there; apt-get install ffmpeg or pip install"
-            " 'synfeal[video]', or end the name in .gif"
+            Argument("out"),
+            "MP4 needs ffmpeg, which is not there",
+            "apt-get install ffmpeg or pip install 'synfeal[video]', or end the name in .gif",
         )
     return str(found)
 
@@ -123,7 +131,9 @@ def _write_mp4(pictures: Sequence[Image.Image], fps: float, out: Path) -> None:
     done = subprocess.run(command, input=frames, capture_output=True, check=False)
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip().splitlines() or ["it said nothing"]
-        raise InputError(f"--out: ffmpeg cannot write H.264 ({said[-1][:200]}); use .gif")
+        raise InputError(
+            Argument("out"), f"ffmpeg cannot write H.264 ({said[-1][:200]})", "use .gif"
+        )
 
 
 BIT_EXACT = ("-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact")  # no versions in it

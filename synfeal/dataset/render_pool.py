@@ -108,8 +108,9 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
                 progress.part_done(out.name, len(poses), future.result())
     except BrokenProcessPool as error:
         raise InputError(
-            "collect: a worker process was killed, perhaps for lack of memory; what is done is"
-            " kept: run the same command again, with fewer --cores"
+            "collect",
+            "a worker process was killed, perhaps for lack of memory",
+            "what is done is kept: run the same command again, with fewer `cores`",
         ) from error
     finally:
         stop.set()
@@ -131,7 +132,7 @@ def _start_worker(studio: Studio, workers: int, n_done: Any, stop: Any) -> None:
         with n_done.get_lock():
             n_done.value += 1
         if stop.is_set():  # another worker failed, or the person interrupted
-            raise InputError("collect: stopped")
+            raise InputError("collect", "stopped")
 
     _worker.update(studio=studio, on_frame=on_frame)
 

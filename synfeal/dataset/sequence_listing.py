@@ -95,8 +95,9 @@ class SequenceListing:
                     continue
                 other = next(other for other in KINDS if frame.number in self.numbers[other])
                 raise InputError(
-                    f"{frame.path(own)}: missing, though {frame.path(other).name} is there;"
-                    " restore it, or delete the other files of the frame"
+                    frame.path(own),
+                    f"missing, though {frame.path(other).name} is there",
+                    "restore it, or delete the other files of the frame",
                 )
         return [frame.path(kind) for frame in self.frames]
 
@@ -166,14 +167,15 @@ def list_sequences(dataset: Path) -> list[SequenceListing]:
         InputError: ``dataset`` is not a directory, holds no ``seq-XX``, or an archive is damaged.
     """
     if not dataset.is_dir():
-        raise InputError(f"{dataset}: is not a directory; give the directory that holds seq-01")
+        raise InputError(dataset, "is not a directory", "give the directory that holds seq-01")
     names = {path.name.removesuffix(SUFFIX) for path in dataset.glob("seq-*")}
     paths = [sequence_at(dataset / name) for name in names if name[4:].isdecimal()]
     found = [path for path in paths if is_sequence(path)]
     if not found:
         raise InputError(
-            f"{dataset}: holds no seq-01 and no seq-01{SUFFIX}; give the directory of a 7-Scenes"
-            " data set"
+            dataset,
+            f"holds no seq-01 and no seq-01{SUFFIX}",
+            "give the directory of a 7-Scenes data set",
         )
     found.sort(key=lambda path: (int(path.stem[4:]), path.stem))
     return [list_sequence(path) for path in found]

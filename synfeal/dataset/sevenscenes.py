@@ -39,9 +39,9 @@ def read_pose(path: FrameFile) -> NDArray[np.float64]:
         rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines() if line]
         pose = np.array(rows, np.float64)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
-        raise InputError(f"{path}: a pose is four rows of four finite numbers")
+        raise InputError(path, "a pose is four rows of four finite numbers")
     if np.abs(pose).max() > FARTHEST_M:
-        raise InputError(f"{path}: holds {np.abs(pose).max():.3g}, which is no place in metres")
+        raise InputError(path, f"holds {np.abs(pose).max():.3g}, which is no place in metres")
     return pose
 
 
@@ -62,11 +62,11 @@ def frame_paths(sequences: Iterable[Path], kind: str) -> list[FrameFile]:
     for sequence in sequences:
         listing = list_sequence(sequence)
         if not listing.numbers[kind]:
-            raise InputError(f"{sequence}: holds no frame-XXXXXX.{kind}; render it again")
+            raise InputError(sequence, f"holds no frame-XXXXXX.{kind}", "render it again")
         paths += listing.files(kind)
         if gap := gap_in(listing):
             raise InputError(
-                f"{gap.path(kind)}: missing, with all files of the frame; render it again"
+                gap.path(kind), "missing, with all files of the frame", "render it again"
             )
     return paths
 
@@ -93,12 +93,12 @@ def frames_between(
     for sequence, part in zip(sequences[:-1], parts[:-1], strict=True):
         if len(part) < most:
             missing = frame_file(sequence, f"frame-{len(part):06d}.{kind}")
-            raise InputError(f"{missing}: missing, with all files of the frame; render it again")
+            raise InputError(missing, "missing, with all files of the frame", "render it again")
     paths = [path for part in parts for path in part]
     if stop is not None and len(paths) < stop:
         places = ", ".join(map(str, sequences))
         raise InputError(
-            f"{places}: hold {len(paths)} frames, {stop} are needed; render them again"
+            places, f"hold {len(paths)} frames, {stop} are needed", "render them again"
         )
     return paths[start:stop]
 
@@ -116,16 +116,16 @@ def read_split(dataset_dir: Path, split: str) -> list[Path]:
     """List the sequences of a split in order, each as a directory or an archive."""
     path = dataset_dir / SPLIT_FILES[split]
     if not os.path.lexists(path):
-        raise InputError(f"{path}: missing; a 7-Scenes data set has one")
+        raise InputError(path, "missing; a 7-Scenes data set has one")
     with read_as(path, "a list of sequences"):
         lines = path.read_text(encoding="utf-8").split()
     bad = [line for line in lines if not SEQUENCE.fullmatch(line)]
     if bad:
-        raise InputError(f"{path}: '{bad[0][:40]}' names no sequence; lines look like 'sequence1'")
+        raise InputError(path, f"'{bad[0][:40]}' names no sequence; lines look like 'sequence1'")
     numbers = [int(line.removeprefix("sequence")) for line in lines]
     twice = [line for at, line in enumerate(lines) if numbers[at] in numbers[:at]]
     if twice:
-        raise InputError(f"{path}: lists {twice[0]} twice; leave one line")
+        raise InputError(path, f"lists {twice[0]} twice", "leave one line")
     return [sequence_at(dataset_dir / f"seq-{number:02d}") for number in numbers]
 
 

@@ -57,7 +57,7 @@ def read_split_frames(dataset: Path, split: str) -> SplitFrames:
     for sequence in sequences:
         if not sequence.frames:
             raise InputError(
-                f"{sequence.path}: holds no frame, but {SPLIT_FILES[split]} lists it; restore it"
+                sequence.path, f"holds no frame, but {SPLIT_FILES[split]} lists it", "restore it"
             )
     listed = SplitFrames(sequences, None)
     path = dataset / f"{split}.csv"

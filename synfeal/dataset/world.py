@@ -69,8 +69,9 @@ def rigid_motion_of(record: Any, path: Path) -> NDArray[np.float64]:
         matrix = np.empty(0)
     if not is_rigid(matrix):
         raise InputError(
-            f"{path}: {KEY} must be four rows of four numbers, a rotation and a translation above"
-            " 0 0 0 1; make the scan or the data set again"
+            path,
+            f"{KEY} must be four rows of four numbers, a rotation and a translation above 0 0 0 1",
+            "make the scan or the data set again",
         )
     return matrix
 

@@ -205,8 +205,9 @@ def open_scene(
     missing = [file for file in files.values() if not file.is_file()]
     if missing:
         raise InputError(
-            f"{missing[0]}: missing, and light.states needs it; of a mesh of your own use ev,"
-            " temperature_k and field_ev"
+            missing[0],
+            "missing, and light.states needs it; of a mesh of your own use ev, temperature_k and"
+            " field_ev",
         )
     crowd = crowd_of(mesh, render)
     shares = {group: load_mesh(file) for group, file in files.items()}

@@ -57,8 +57,10 @@ def checked_convention(
             name = OPENGL if is_opengl else str(convention)
             axes = f" (camera axes {DESCRIPTIONS['opengl']})" * is_opengl
             raise InputError(
-                f"{path}: read as {estimates.kind} ({estimates.convention}) it is"
-                f" {_text(taken)} off, as {name}{axes} {_text(other)}; say which with --convention"
+                path,
+                f"read as {estimates.kind} ({estimates.convention}) it is {_text(taken)} off,"
+                f" as {name}{axes} {_text(other)}",
+                "say which with `convention`",
             )
 
 

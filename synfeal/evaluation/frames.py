@@ -132,8 +132,9 @@ def _unsplit_photographs(dataset: Path) -> ScoredFrames:
     """Read all photographs of a folder that have a pose."""
     if is_tum(dataset):
         raise InputError(
-            f"{dataset}: poses of TUM RGB-D sequences are scored by the tools of that benchmark and"
-            " by evo; give a folder of frame-000000.color.png and frame-000000.pose.txt"
+            dataset,
+            "poses of TUM RGB-D sequences are scored by the tools of that benchmark and by evo",
+            "give a folder of frame-000000.color.png and frame-000000.pose.txt",
         )
     photographs = read_posed_sequence(dataset)
     frames = tuple(_frame_named(dataset, name) for name in photographs.names)
@@ -166,9 +167,9 @@ def _of_split(
     splits, failures = read_splits(dataset, sequences)
     of_split = [failure for failure in failures if SPLIT_FILES[split] in failure]
     if of_split:
-        raise InputError(f"{of_split[0]}; correct it, or give --split all")
+        raise InputError(f'{of_split[0]}; correct it, or give `split="all"`')
     if not splits[split]:
-        raise InputError(f"{dataset / SPLIT_FILES[split]}: lists no sequence")
+        raise InputError(dataset / SPLIT_FILES[split], "lists no sequence")
     return splits[split]
 
 
@@ -219,13 +220,15 @@ def match(
         if row[frame] >= 0:
             first, second = estimates.places[row[frame]], estimates.places[estimate]
             raise InputError(
-                f"{path}: {frames.names[frame]} has two poses, {first} and {second}; leave one"
+                path, f"{frames.names[frame]} has two poses, {first} and {second}", "leave one"
             )
         row[frame] = estimate
     if (row < 0).all():
         raise InputError(
-            f"{path}: none of its {len(keys)} poses is of a frame of the {frames.split} split"
-            f" ({frames.names[0]}, ...); is it of this data set, and of this --split?"
+            path,
+            f"none of its {len(keys)} poses is of a frame of the {frames.split} split"
+            f" ({frames.names[0]}, ...)",
+            "is it of this data set, and of this `split`?",
         )
     return row
 
@@ -248,27 +251,31 @@ def _check_countable(frames: ScoredFrames, n_named: int, path: Path, estimates: 
     if estimates.kind == KITTI:
         remedy = "KITTI's format has no names, give another"
     if frames.split == "all":
-        raise InputError(f"{path}: its rows count the frames of one split, not of all; {remedy}")
+        raise InputError(path, "its rows count the frames of one split, not of all", remedy)
     if frames.gap is not None:
         raise InputError(
-            f"{path}: names no frames, and {frames.gap.name} is missing, so its rows may count"
-            f" others; {remedy}"
+            path,
+            f"names no frames, and {frames.gap.name} is missing, so its rows may count others",
+            remedy,
         )
     if n_named != len(frames.frames):
         raise InputError(
-            f"{path}: has poses of {n_named} frames without their names, but the {frames.split}"
-            f" split has {len(frames.frames)}; is it of this --split? If so, {remedy}"
+            path,
+            f"has poses of {n_named} frames without their names, but the {frames.split} split has"
+            f" {len(frames.frames)}",
+            f"is it of this `split`? If so, {remedy}",
         )
 
 
 def _by_index(frames: ScoredFrames, name: str, where: str) -> Key:
     if not name.isdecimal():
-        raise InputError(f"{where}: frame '{name[:40]}' must be a whole number, 0 or above")
+        raise InputError(where, f"frame '{name[:40]}' must be a whole number, 0 or above")
     place = int(name)
     if place >= len(frames.frames):
         raise InputError(
-            f"{where}: frame {place} does not exist: the {frames.split} split has"
-            f" {len(frames.frames)} frames, counted from 0"
+            where,
+            f"frame {place} does not exist: the {frames.split} split has {len(frames.frames)}"
+            " frames, counted from 0",
         )
     frame = frames.frames[place]
     return frame.sequence.stem, frame.number
@@ -277,12 +284,14 @@ def _by_index(frames: ScoredFrames, name: str, where: str) -> Key:
 def _by_name(name: str, stems: Sequence[str], where: str, _: float) -> Key:
     found = list(NAME.finditer(name.replace("\\", "/")))
     if not found:
-        raise InputError(f"{where}: '{name[:80]}' names no frame; names hold seq-01/frame-000000")
+        raise InputError(where, f"'{name[:80]}' names no frame; names hold seq-01/frame-000000")
     sequence, number = found[-1].groups()
     if sequence is None and len(stems) > 1:
         raise InputError(
-            f"{where}: '{name[:80]}' does not say of which sequence, and there are {len(stems)}"
-            f" ({stems[0]}, ...); write {stems[0]}/{Path(name).name[:40]}"
+            where,
+            f"'{name[:80]}' does not say of which sequence, and there are {len(stems)}"
+            f" ({stems[0]}, ...)",
+            f"write {stems[0]}/{Path(name).name[:40]}",
         )
     return stems[0] if sequence is None else f"seq-{int(sequence):02d}", int(number)
 
@@ -291,13 +300,15 @@ def _by_time(name: str, stems: Sequence[str], where: str, rate_hz: float) -> Key
     sequence, _, stamp = name.rpartition("/")
     if not sequence and len(stems) > 1:
         raise InputError(
-            f"{where}: time stamps do not say of which sequence, and there are {len(stems)}; give a"
-            f" directory with one file for each: {stems[0]}.txt, ..."
+            where,
+            f"time stamps do not say of which sequence, and there are {len(stems)}",
+            f"give a directory with one file for each: {stems[0]}.txt, ...",
         )
     number = float(stamp) * rate_hz
     if not (abs(number) < 1e15 and abs(number - round(number)) <= TIME_SLACK and number >= 0):
         raise InputError(
-            f"{where}: at {stamp} s there is no frame with {rate_hz:g} of them a second; give"
-            " --rate (1 where frames are numbered)"
+            where,
+            f"at {stamp} s there is no frame with {rate_hz:g} of them a second",
+            "give `rate_hz` (1 where frames are numbered)",
         )
     return sequence or stems[0], round(number)

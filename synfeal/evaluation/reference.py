@@ -57,8 +57,9 @@ def read_reference(path: Path) -> ScoredFrames:
     lost = np.flatnonzero(~np.isfinite(world_from_cam).all(axis=(1, 2)))
     if len(lost):
         raise InputError(
-            f"{path}: {found.places[lost[0]]} is no rotation and position ({len(lost)} of"
-            f" {len(world_from_cam)} poses); a reference needs a pose on every line"
+            path,
+            f"{found.places[lost[0]]} is no rotation and position ({len(lost)} of"
+            f" {len(world_from_cam)} poses); a reference needs a pose on every line",
         )
     names = _keys(found)
     if found.frame_key == "name":
@@ -92,7 +93,7 @@ def _refuse_twice(path: Path, found: PoseList, names: tuple[str, ...]) -> None:
     for name, place in zip(names, found.places, strict=True):
         if name in first:
             raise InputError(
-                f"{path}: '{name[:80]}' has two poses, {first[name]} and {place}; leave one"
+                path, f"'{name[:80]}' has two poses, {first[name]} and {place}", "leave one"
             )
         first[name] = place
 
@@ -109,9 +110,10 @@ def refuse_same_times(path: Path, found: PoseList) -> None:
     for time_s, name, place in zip(times_s.tolist(), found.names, found.places, strict=True):
         if time_s in first:
             raise InputError(
-                f"{path}: the time {name[:40]} has two poses, {first[time_s]} and {place}"
-                f" ({len(times_s)} poses at {n_times} times); are two runs in one file, or times"
-                " rounded? Give each run a file of its own, and times as they were measured"
+                path,
+                f"the time {name[:40]} has two poses, {first[time_s]} and {place} ({len(times_s)}"
+                f" poses at {n_times} times); are two runs in one file, or times rounded? Give"
+                " each run a file of its own, and times as they were measured",
             )
         first[time_s] = place
 
@@ -139,15 +141,17 @@ def match_reference(
     if estimates.frame_key != frames.frame_key:
         own, other = SAYS[estimates.frame_key], SAYS[frames.frame_key or "name"]
         raise InputError(
-            f"{path}: is {estimates.kind}, whose poses have {own}, but those of the reference have"
-            f" {other}; give both in formats that say the same"
+            path,
+            f"is {estimates.kind}, whose poses have {own}, but those of the reference have {other}",
+            "give both in formats that say the same",
         )
     n_frames = len(frames.names)
     if frames.frame_key == "index":
         if len(estimates.names) != n_frames:
             raise InputError(
-                f"{path}: has {len(estimates.names)} poses, the reference {n_frames}, and nothing"
-                " says which frames they are of; both must have a line for every frame"
+                path,
+                f"has {len(estimates.names)} poses, the reference {n_frames}, and nothing says"
+                " which frames they are of; both must have a line for every frame",
             )
         return np.arange(n_frames)
     if frames.frame_key == "time":
@@ -161,9 +165,9 @@ def match_reference(
         middle_s = float(np.median(apart_s))
         what = (
             f"within {clock.most_apart_s:g} s of one of the reference ({frames.names[0]} s, ...);"
-            f" they are {middle_s:+.3g} s apart (median): give --offset"
-            f" {-middle_s + clock.offset_s:.3g} if the two clocks differ, or a larger"
-            " --max-difference"
+            f" they are {middle_s:+.3g} s apart (median): give"
+            f" `offset_s={-middle_s + clock.offset_s:.3g}` if the two clocks differ, or a larger"
+            " `max_difference_s`"
         )
     else:
         keys = _keys(estimates)
@@ -172,7 +176,7 @@ def match_reference(
         row = np.array([index.get(name, -1) for name in frames.names])
         what = f"of an image of the reference ({frames.names[0]}, ...)"
     if (row < 0).all():
-        raise InputError(f"{path}: none of its {len(estimates.names)} poses is {what}")
+        raise InputError(path, f"none of its {len(estimates.names)} poses is {what}")
     return row
 
 

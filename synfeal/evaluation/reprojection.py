@@ -44,7 +44,7 @@ CELLS = (8, 6)  # columns, rows
 # RIO10 prints the share of frames with a DCRE below these.
 DCRE_BOUNDS = (0.05, 0.15)
 BLOCK = 2000  # frames at once: bounds memory
-OTHER_CAMERA = "; give the camera of these images with --camera"
+OTHER_CAMERA = "; give the camera of these images with `camera`"
 
 
 def _directions(camera: CameraConfig) -> Array:
@@ -138,10 +138,10 @@ def read_cell_depth(path: Path, n_frames: int) -> Array:
         # A map is refused where the header claims more than the file holds; an array is not.
         depth_mm = np.load(path, mmap_mode="r", allow_pickle=False)
     if depth_mm.dtype != np.uint16 or depth_mm.shape[1:] != (CELLS[0] * CELLS[1],):
-        raise InputError(f"{path}: does not hold depths of {CELLS[0]} x {CELLS[1]} cells")
+        raise InputError(path, f"does not hold depths of {CELLS[0]} x {CELLS[1]} cells")
     if len(depth_mm) < n_frames:
         raise InputError(
-            f"{path}: holds {len(depth_mm)} frames, {n_frames} are needed; make it again"
+            path, f"holds {len(depth_mm)} frames, {n_frames} are needed", "make it again"
         )
     depth_mm = depth_mm[:n_frames]
     return np.where(depth_mm > 0, depth_mm / 1000.0, np.inf)

@@ -17,7 +17,7 @@ from synfeal.dataset.pose_list import Convention, PoseList, named_convention
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.poses_in import FormatName, read_pose_list
 from synfeal.dataset.sequence_listing import DEPTH
-from synfeal.errors import InputError, why
+from synfeal.errors import Argument, InputError, why
 from synfeal.evaluation.bootstrap import FEWEST_PATHS
 from synfeal.evaluation.estimates import checked_convention
 from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
@@ -93,13 +93,16 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
         InputError: One of the files cannot be used.
     """
     if settings.rate_hz is not None and not 0 < settings.rate_hz < np.inf:
-        raise InputError(f"--rate: must be above 0 frames a second, found {settings.rate_hz:g}")
+        raise InputError(
+            Argument("rate_hz"), f"must be above 0 frames a second, found {settings.rate_hz:g}"
+        )
     if not 0 < settings.most_apart_s < np.inf:
         raise InputError(
-            f"--max-difference: must be above 0 seconds, found {settings.most_apart_s:g}"
+            Argument("max_difference_s"),
+            f"must be above 0 seconds, found {settings.most_apart_s:g}",
         )
     if not np.isfinite(settings.offset_s):
-        raise InputError(f"--offset: must be finite, found {settings.offset_s:g}")
+        raise InputError(Argument("offset_s"), f"must be finite, found {settings.offset_s:g}")
     frames = _scored(dataset, settings)
     estimates = read_pose_list(poses, settings.file_format)
     _refuse_useless(dataset, poses, frames, estimates, settings)
@@ -124,7 +127,7 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
             errors[f"dcre{end}"] = dcre(answers, truth, depth_m, camera)
     rotations = np.asarray(np.isfinite(predicted).all(axis=(1, 2)))
     if not rotations.any():
-        raise InputError(f"{poses}: none of its poses is a rotation and a position")
+        raise InputError(poses, "none of its poses is a rotation and a position")
     metrics = _metrics(errors, yardsticks, frames)
     return Evaluation(frames, estimates, convention, row, rotations, errors, metrics, scales)
 
@@ -135,25 +138,31 @@ def _refuse_useless(
     """Refuse a rate where nothing has times, and an order of quaternions where there are none."""
     if settings.rate_hz is not None:
         if frames.frame_key is not None:
-            raise InputError(f"--rate: {dataset} is a file of poses, not of frames; leave it out")
+            raise InputError(
+                Argument("rate_hz"), f"{dataset} is a file of poses, not of frames", "leave it out"
+            )
         if estimates.frame_key != "time" and settings.labels is None:
-            raise InputError(f"--rate: {path} is {estimates.kind}, without times; leave it out")
+            raise InputError(
+                Argument("rate_hz"), f"{path} is {estimates.kind}, without times", "leave it out"
+            )
     if frames.frame_key != "time":
-        for option, given in (
-            ("--max-difference", settings.most_apart_s != MOST_APART_S),
-            ("--offset", settings.offset_s != 0.0),
+        for name, given in (
+            ("max_difference_s", settings.most_apart_s != MOST_APART_S),
+            ("offset_s", settings.offset_s != 0.0),
         ):
             if given:
                 raise InputError(
-                    f"{option}: is between the times of two files, and {dataset} has none; leave"
-                    " it out"
+                    Argument(name),
+                    f"is between the times of two files, and {dataset} has none",
+                    "leave it out",
                 )
     order = estimates.convention.order
     asked = named_convention(settings.convention, estimates.convention).order
     if estimates.of_matrices and asked != order:
         raise InputError(
-            f"--convention: {path} is {estimates.kind}, of matrices, which have no order of"
-            f" quaternions; end it in {order}"
+            Argument("convention"),
+            f"{path} is {estimates.kind}, of matrices, which have no order of quaternions",
+            f"end it in {order}",
         )
 
 
@@ -162,8 +171,10 @@ def _scored(dataset: Path, settings: Settings) -> ScoredFrames:
     if not dataset.is_file() or dataset.suffix == ".zip":
         return read_scored_frames(dataset, settings.split)
     if settings.split != "test" or settings.camera is not None:
-        option = "--camera" if settings.split == "test" else "--split"
-        raise InputError(f"{option}: {dataset} is a file of poses and has none; leave it out")
+        name = "camera" if settings.split == "test" else "split"
+        raise InputError(
+            Argument(name), f"{dataset} is a file of poses and has none", "leave it out"
+        )
     return read_reference(dataset)
 
 
@@ -175,8 +186,9 @@ def _matched(
         return match_reference(frames, estimates, path)
     if settings.rate_hz is None and estimates.counts_seconds:
         raise InputError(
-            f"{path}: its times are 0, 1, 2, ...: give --rate 1 if they number the frames, or the"
-            " frames a second of the data set"
+            path,
+            "its times are 0, 1, 2, ...",
+            "give `rate_hz=1` if they number the frames, or the frames a second of the data set",
         )
     return match(frames, estimates, path, settings.rate_hz or DEFAULT_RATE_HZ)
 
@@ -241,8 +253,10 @@ def _taken(
     if far.any():
         bad = int(np.argmax(far.any(axis=1)))
         raise InputError(
-            f"{path}: {estimates.places[bad]}: a position of"
-            f" {np.abs(estimates.translation[bad]).max():.3g} m is no place; leave the line out"
+            path,
+            f"{estimates.places[bad]}: a position of"
+            f" {np.abs(estimates.translation[bad]).max():.3g} m is no place",
+            "leave the line out",
         )
     there = row >= 0
     if not convention and settings.align == "none":
@@ -261,8 +275,9 @@ def _labels(path: Path, frames: ScoredFrames, settings: Settings) -> Array:
     lost = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))
     if len(lost):
         raise InputError(
-            f"{path}: has no pose of {frames.names[lost[0]]} ({len(lost)} of {len(poses)} frames);"
-            " labels need one for every frame"
+            path,
+            f"has no pose of {frames.names[lost[0]]} ({len(lost)} of {len(poses)} frames); labels"
+            " need one for every frame",
         )
     return poses
 
@@ -292,7 +307,9 @@ def aligned(poses: Array, reference: Array, align: Align, path: Path) -> tuple[A
             poses[there, :3, 3], reference[there, :3, 3], with_scale=align == "sim3"
         )
     except ValueError as error:
-        raise InputError(f"{path}: cannot be aligned ({why(error)}); give --align none") from error
+        raise InputError(
+            path, f"cannot be aligned ({why(error)})", 'give `align="none"`'
+        ) from error
     moved = poses.copy()
     moved[:, :3, :3] = rotation @ poses[:, :3, :3]
     moved[:, :3, 3] = scale * poses[:, :3, 3] @ rotation.T + translation

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN = 3  # frames named where some are missing
-TITLES = {"": "against the data set", "_labels": "against --labels"}
+TITLES = {"": "against the data set", "_labels": "against the labels"}
 
 
 def rows_of(found: Evaluation) -> list[tuple[str, str, str, float]]:

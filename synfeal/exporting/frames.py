@@ -101,7 +101,9 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
     camera = camera_of_dataset(dataset, camera_file)
     if camera.assumed:
         raise InputError(
-            f"{dataset / 'manifest.json'}: missing, so the camera is not known; give --camera FILE"
+            dataset / "manifest.json",
+            "missing, so the camera is not known",
+            "give `camera=FILE`",
         )
     splits, split_failures = read_splits(dataset, sequences)
     poses, unreadable = read_poses(sequences)
@@ -129,8 +131,9 @@ def read_export_set(dataset: Path, camera_file: Path | None) -> ExportSet:
     width, height = image_size(frames[0].color)
     if (width, height) != (camera.config.width, camera.config.height):
         raise InputError(
-            f"{frames[0].color}: is {width} x {height}, the camera is {camera.config.width} x"
-            f" {camera.config.height}; give the camera of these images with --camera"
+            str(frames[0].color),
+            f"is {width} x {height}, the camera is {camera.config.width} x {camera.config.height}",
+            "give the camera of these images with `camera`",
         )
     has_depth = DEPTH in kinds_of(sequences)
     return ExportSet(dataset, camera.config, frames, has_depth, bool(splits))
@@ -140,17 +143,16 @@ def need_splits(data: ExportSet) -> None:
     """Refuse a data set that does not say which frames are for training, and which for test."""
     for split, name in SPLIT_FILES.items():
         if next(data.of_split(split), None) is None:
-            raise InputError(
-                f"{data.path / name}: lists no frame; this format needs {split} frames"
-            )
+            raise InputError(data.path / name, f"lists no frame; this format needs {split} frames")
 
 
 def need_perspective(data: ExportSet, program: str) -> None:
     """Refuse a fisheye or a panorama where a format has no such camera."""
     if data.camera.projection is not None:
         raise InputError(
-            f"{data.path}: {program} knows perspective cameras, and this one is"
-            f" {data.camera.projection}; export to colmap or nerfstudio"
+            data.path,
+            f"{program} knows perspective cameras, and this one is {data.camera.projection}",
+            "export to colmap or nerfstudio",
         )
 
 

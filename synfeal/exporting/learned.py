@@ -60,7 +60,7 @@ def export_ace(data: ExportSet, out: Path, place: Place) -> None:
     camera = data.camera.intrinsics
     if any(data.camera.distortion) or abs(camera.fx - camera.fy) > 1e-5 * camera.fx:
         raise InputError(
-            f"{data.path}: ACE knows one focal length and no distortion; undistort the images first"
+            data.path, "ACE knows one focal length and no distortion", "undistort the images first"
         )
     matrix, lost = [" ".join(map(repr, row)) for row in camera.matrix().tolist()], 0.0
     for frame in data.frames:

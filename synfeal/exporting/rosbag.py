@@ -22,7 +22,7 @@ import numpy as np
 from synfeal.dataset.depth import MILLIMETRES, read_depth_m
 from synfeal.dataset.images import read_rgb
 from synfeal.dataset.sevenscenes import SPLIT_FILES
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.exporting.frames import ExportFrame, ExportSet, Place, need_perspective
 from synfeal.geometry.poses import quat_wxyz_of
 
@@ -47,7 +47,9 @@ def export_rosbag(data: ExportSet, out: Path, place: Place) -> None:
         from rosbags.typesys import Stores, get_typestore
     except ModuleNotFoundError as error:
         raise InputError(
-            "--to rosbag: needs the package rosbags, which is not there; pip install 'synfeal[ros]'"
+            Argument("to"),
+            "rosbag needs the package rosbags, which is not there",
+            "pip install 'synfeal[ros]'",
         ) from error
     store = get_typestore(Stores.ROS2_HUMBLE)
     for sequence, frames in groupby(data.frames, key=lambda frame: frame.sequence):

@@ -68,4 +68,4 @@ def refuse_non_rigid(matrix: Array, where: object) -> None:
         InputError: It is not.
     """
     if not is_rigid(matrix):
-        raise InputError(f"{where}: is not a rigid pose; its upper left 3x3 must be a rotation")
+        raise InputError(where, "is not a rigid pose; its upper left 3x3 must be a rotation")

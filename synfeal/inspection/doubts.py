@@ -46,7 +46,7 @@ def doubts_of(
         unit_m: Unit of the file as it was taken.
     """
     longest_m, axis = float(extents_m.max()), int(floors_m2.argmax())
-    turn = "try the other --up-axis" if axis == 1 else "turn the mesh before exporting it"
+    turn = "try the other `up_axis`" if axis == 1 else "turn the mesh before exporting it"
     can_stand = space.floor_m is not None
     return _that_hold(
         (
@@ -61,7 +61,7 @@ def doubts_of(
         (
             not can_stand,
             "no place to stand with walls around it was found, so no box is suggested: check unit"
-            " and up axis, or give --box where cameras shall go",
+            " and up axis, or give `box` where cameras shall go",
         ),
         (
             can_stand and space.enclosure < MIN_ENCLOSURE,
@@ -98,14 +98,14 @@ def _unit_advice(extents_m: Array, unit_m: float) -> str:
     units = [f"{unit:g}" for unit in units_of_a_room(extents_m / unit_m)]
     if units:
         named = " or ".join([", ".join(units[:-1]), units[-1]] if units[1:] else units)
-        return f"the unit is probably wrong; try --unit-m {named}"
+        return f"the unit is probably wrong; try `unit_m={named}`"
     if extents_m.max() > EXTENTS_M[1]:
         return (
             "in no usual unit is that a room. If it is terrain or a town, all is well, but for"
-            " depth, which is stored up to 65.5 m unless collect gets --depth-scale; else remove"
+            " depth, which is stored up to 65.5 m unless collect gets `depth_scale`; else remove"
             " what lies far away from the rest"
         )
-    return "in no usual unit is that a room; measure it, and give --unit-m"
+    return "in no usual unit is that a room; measure it, and give `unit_m`"
 
 
 def _that_hold(*doubts: tuple[bool, str]) -> list[str]:
@@ -120,7 +120,7 @@ def color_doubts(mesh: TexturedMesh, area_m2: dict[str, float]) -> list[str]:
         area_m2: Its surface by what colours it.
     """
     plain, of_one = plain_share(area_m2), shows_one_color(mesh)
-    light = "; the command below lights it (--shade), which shows its shape"
+    light = "; the command below lights it (`shade`), which shows its shape"
     return _that_hold(
         (
             of_one,
@@ -142,12 +142,12 @@ def plain_share(area_m2: dict[str, float]) -> float:
 def suggestion_doubts(suggestion: Suggestion) -> list[str]:
     """Return doubts about the data set that the suggested command makes."""
     empty, scene = suggestion.empty, suggestion.scene
-    asked = f", although --min-seen {scene.min_seen:g} refuses the worst" if scene.min_seen else ""
+    asked = f", although `min_seen={scene.min_seen:g}` refuses the worst" if scene.min_seen else ""
     return _that_hold(
         (
             suggestion.is_narrow,
             "the free space is too narrow for the default paths; the command below allows shorter"
-            " ones (--min-path) and nearer views (--min-view-distance)",
+            " ones (`min_path_m`) and nearer views (`min_view_distance_m`)",
         ),
         (
             suggestion.covered < MIN_COVERED,
@@ -224,8 +224,8 @@ def load_as_meant(
         before, after = (" x ".join(f"{m:.3g}" for m in k * extents_m) for k in (1.0, unit_m))
         notes.append(
             f"the mesh spans {before}, which no room does in metres; taken as"
-            f" {UNITS_M[unit_m] or f'units of {unit_m:g} m'} (--unit-m {unit_m:g}), which makes it"
-            f" {after} m; if that is wrong, give --unit-m"
+            f" {UNITS_M[unit_m] or f'units of {unit_m:g} m'} (`unit_m={unit_m:g}`), which makes it"
+            f" {after} m; if that is wrong, give `unit_m`"
         )
     if scene.up_axis == "auto":
         points = SurfacePoints.of(mesh, np.random.default_rng(0), N_POINTS)
@@ -237,7 +237,7 @@ def load_as_meant(
             mesh = _load(scene)
             notes.append(
                 f"taken with {other} up, where its largest floor is {floors_m2[1]:.3g} m^2 and not"
-                f" {floors_m2[2]:.3g} m^2; if that is wrong, give --up-axis"
+                f" {floors_m2[2]:.3g} m^2; if that is wrong, give `up_axis`"
             )
     return scene, mesh, notes
 

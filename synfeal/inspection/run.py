@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -49,7 +50,13 @@ MARGIN = 0.04
 WORLD_FROM_CAM_ABOVE: Array = np.diag([1.0, -1.0, -1.0])  # x right, y up in the image
 
 
-def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> str:
+def inspect_mesh(
+    scene: SceneConfig,
+    out: Path,
+    unit_is_given: bool = True,
+    *,
+    wording: Callable[[str], str] = str,
+) -> str:
     """Inspect a mesh and write ``inspect.json``, ``inspect.png`` and ``inspect.html``.
 
     Args:
@@ -58,6 +65,7 @@ def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> s
         out: Directory to write into; earlier files of these names are replaced.
         unit_is_given: Keep the scene's unit. Otherwise, and without a ``sampling_box``, one that
             makes no room of the mesh is replaced.
+        wording: Rewords advice, which names arguments as Python has them.
 
     Returns:
         The findings as text to print.
@@ -68,6 +76,7 @@ def inspect_mesh(scene: SceneConfig, out: Path, unit_is_given: bool = True) -> s
     refuse_foreign(out, OUTPUTS, "an inspection")
     found = Inspection.of(scene, unit_is_given or scene.sampling_box is not None)
     facts = facts_of(found)
+    facts["doubts"] = [wording(doubt) for doubt in facts["doubts"]]
     picture = picture_png(facts, found)
     edges = [edge for box_m in found.suggested_m for edge in box_lines(box_m)]
     heading = heading_from_opening(found.caster, found.viewpoint_m)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from synfeal.config.collect import SCENE, TEST_PATHS, CollectConfig, checked
 from synfeal.config.collection import Box, CollectionConfig, SceneConfig
 from synfeal.config.dataset import CameraConfig, RenderConfig, Shade
-from synfeal.config.flags import as_options
+from synfeal.config.flags import as_options, flag_of
 from synfeal.dataset.images import is_of_one_color
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.dataset.sevenscenes import Split
@@ -107,7 +107,7 @@ class Suggestion:
         """Return the complete line that collects what was planned, ready for a shell."""
         settings = self.settings
         mesh, *options = as_options(settings)[1:]  # an argument without its flag
-        return shlex.join(["synfeal", "collect", mesh, *options, "--out", out])
+        return shlex.join(["synfeal", "collect", mesh, *options, flag_of("out"), out])
 
     @property
     def settings(self) -> CollectConfig:

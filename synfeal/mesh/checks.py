@@ -30,13 +30,14 @@ ROUNDING = 4 * np.finfo(np.float64).eps
 def check_mesh(mesh: TexturedMesh, path: Path) -> None:
     """Check for faces and finite coordinates."""
     if not mesh.parts:
-        raise InputError(f"{path}: holds no faces; export the scene as a triangle mesh")
+        raise InputError(path, "holds no faces", "export the scene as a triangle mesh")
     for part in mesh.parts:
         bad = ~np.isfinite(part.vertices_m).all(axis=1)
         if bad.any():
             raise InputError(
-                f"{path}: part '{part.name}' has {bad.sum()} vertices that are NaN or infinite;"
-                " repair the mesh"
+                path,
+                f"part '{part.name}' has {bad.sum()} vertices that are NaN or infinite; repair the"
+                " mesh",
             )
 
 
@@ -45,9 +46,10 @@ def refuse_colorless(mesh: TexturedMesh, name: str) -> None:
     painted = any(p.texture is not None or p.vertex_rgb is not None for p in mesh.parts)
     if not painted and len({part.base_color.tobytes() for part in mesh.parts}) == 1:
         raise InputError(
-            f"{name}: has neither a texture nor vertex colours; images would be of one colour."
-            " Export it with its texture (an OBJ with its .mtl), or show its shape by the light of"
-            " a lamp at the camera: --shade headlight"
+            name,
+            "has neither a texture nor vertex colours; images would be of one colour. Export it"
+            " with its texture (an OBJ with its .mtl), or show its shape by the light of a lamp at"
+            ' the camera: `shade="headlight"`',
         )
 
 
@@ -55,7 +57,7 @@ def check_indices(part: MeshPart, path: Path) -> None:
     """Refuse faces that name vertices that do not exist."""
     if part.faces.min() < 0 or part.faces.max() >= len(part.vertices_m):
         raise InputError(
-            f"{path}: part '{part.name}' has faces that name vertices it lacks; export it again"
+            path, f"part '{part.name}' has faces that name vertices it lacks", "export it again"
         )
 
 
@@ -98,8 +100,9 @@ def check_sampling_box(box: NDArray[np.float64], bounds_m: NDArray[np.float64], 
         return
     problem = "lies outside" if (overlap <= 0).any() else f"is {ratio:.0f} times smaller than"
     raise InputError(
-        f"{name}: the sampling box {_show(box)} m {problem} the mesh, which spans"
-        f" {_show(bounds_m)} m; unit_m or up_axis is probably wrong"
+        name,
+        f"the sampling box {_show(box)} m {problem} the mesh, which spans {_show(bounds_m)} m;"
+        " unit_m or up_axis is probably wrong",
     )
 
 
@@ -176,22 +179,24 @@ def refuse_file(path: Path) -> None:
     """Check that there is a file, by its name of a kind that can hold a scene with colours."""
     if not path.is_file():
         raise InputError(
-            f"{path}: no such mesh file; check the path (config/scenes/README.md says where the"
-            " paper's meshes are)"
+            path,
+            "no such mesh file",
+            "check the path (config/scenes/README.md says where the paper's meshes are)",
         )
     if path.stat().st_size == 0:
-        raise InputError(f"{path}: the mesh file is empty; download or export it again")
+        raise InputError(path, "the mesh file is empty", "download or export it again")
     suffix = path.suffix.lower()
     if suffix == ".stl":
         raise InputError(
-            f"{path}: an STL file holds shape without colour, so every image would be blank; export"
-            " the scene as GLB, as OBJ with MTL and textures, or as PLY with vertex colours"
+            path,
+            "an STL file holds shape without colour, so every image would be blank",
+            "export the scene as GLB, as OBJ with MTL and textures, or as PLY with vertex colours",
         )
     if suffix not in SUFFIXES:
         kind, remedy = OTHER_KINDS.get(
             suffix, (f"unknown kind of mesh '{path.suffix}'", f"convert it to one of {NAMES}")
         )
-        raise InputError(f"{path}: {kind}; {remedy}")
+        raise InputError(path, kind, remedy)
 
 
 def refuse_extensions(path: Path, header: Json) -> None:
@@ -207,15 +212,16 @@ def refuse_extensions(path: Path, header: Json) -> None:
         remedy = REMEDIES.get(name, "export it without this extension")
         if name in LIBRARIES:
             remedy = f"pip install '{EXTRA}', or {remedy}"
-        raise InputError(f"{path}: needs the glTF extension {name}, which is not read; {remedy}")
+        raise InputError(path, f"needs the glTF extension {name}, which is not read", remedy)
     for primitive in primitives_of(header):  # positions, triangles, colours, texture coordinates
         attributes = primitive["attributes"]
         read = [attributes[key] for key in attributes if key.startswith(("POS", "TEX", "COL"))]
         read += [primitive["indices"]] if "indices" in primitive else []
         if any("sparse" in header["accessors"][index] for index in read):
             raise InputError(
-                f"{path}: stores vertices in sparse accessors, which are not read;"
-                " export it again without morph targets or as OBJ"
+                path,
+                "stores vertices in sparse accessors, which are not read",
+                "export it again without morph targets or as OBJ",
             )
 
 

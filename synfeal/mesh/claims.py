@@ -46,13 +46,15 @@ def check_accessors(path: Path, header: Json) -> None:
         reach = accessor.get("byteOffset", 0) + (count - 1) * stride + row
         if not (count >= 0 and stride >= row and reach <= view["byteLength"]):
             raise InputError(
-                f"{path}: accessor {index} claims {count} values, more than its buffer"
-                " view holds; export it again"
+                path,
+                f"accessor {index} claims {count} values, more than its buffer view holds",
+                "export it again",
             )
     if unstored > MOST_UNSTORED_BYTES:
         raise InputError(
-            f"{path}: claims {unstored / 1e9:.1f} GB of values that it does not store; export it"
-            " again without morph targets"
+            path,
+            f"claims {unstored / 1000000000.0:.1f} GB of values that it does not store",
+            "export it again without morph targets",
         )
 
 
@@ -65,8 +67,9 @@ def check_extent(path: Path, part: MeshPart) -> None:
     farthest_m = float(np.abs(part.vertices_m).max(initial=0.0))
     if FARTHEST_M < farthest_m < np.inf:  # what is not finite is said elsewhere
         raise InputError(
-            f"{path}: part '{part.name}' has a vertex {farthest_m:.3g} m from the origin; remove"
-            " it, or give the unit of the file with unit_m"
+            path,
+            f"part '{part.name}' has a vertex {farthest_m:.3g} m from the origin",
+            "remove it, or give the unit of the file with `unit_m`",
         )
 
 
@@ -79,7 +82,7 @@ def check_size(path: Path, mesh: TexturedMesh) -> None:
     longest_m = float(np.ptp(mesh.bounds_m, axis=0).max())
     if longest_m < SHORTEST_M:
         raise InputError(
-            f"{path}: is {longest_m:.3g} m long; give the unit of the file with unit_m"
+            path, f"is {longest_m:.3g} m long", "give the unit of the file with `unit_m`"
         )
 
 
@@ -91,8 +94,9 @@ def check_instances(path: Path, n_faces: int) -> None:
     """
     if n_faces > MOST_FACES:
         raise InputError(
-            f"{path}: draws {n_faces} faces, its instances counted; at most {MOST_FACES} are read."
-            " Simplify it, or export fewer copies"
+            path,
+            f"draws {n_faces} faces, its instances counted; at most {MOST_FACES} are read."
+            " Simplify it, or export fewer copies",
         )
 
 
@@ -105,6 +109,8 @@ def check_textures(path: Path, n_pixels: int) -> None:
     needed, there = 4 * n_pixels, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if needed > there:
         raise InputError(
-            f"{path}: its textures take {needed / 1e9:.1f} GB when decoded, this machine has"
-            f" {there / 1e9:.1f} GB; make them smaller"
+            path,
+            f"its textures take {needed / 1000000000.0:.1f} GB when decoded, this machine has"
+            f" {there / 1000000000.0:.1f} GB",
+            "make them smaller",
         )

@@ -51,13 +51,13 @@ def read_gltf(path: Path) -> Gltf:
     if path.suffix.lower() == ".gltf":
         return Gltf(_parse_json(path, content))
     if content[:4] != GLB_MAGIC or len(content) < 20:
-        raise InputError(f"{path}: cannot be read as a mesh (not a GLB file, whatever its name)")
+        raise InputError(path, "cannot be read as a mesh (not a GLB file, whatever its name)")
     version, size = struct.unpack_from("<II", content, 4)
     if version != 2:
-        raise InputError(f"{path}: is glTF {version}; convert it to glTF 2.0")
+        raise InputError(path, f"is glTF {version}", "convert it to glTF 2.0")
     if len(content) < size:
         raise InputError(
-            f"{path}: ends after {len(content)} of {size} bytes; download or export it again"
+            path, f"ends after {len(content)} of {size} bytes", "download or export it again"
         )
     chunks: dict[bytes, bytes] = {}
     start = 12
@@ -66,7 +66,7 @@ def read_gltf(path: Path) -> Gltf:
         chunks.setdefault(kind, content[start + 8 : start + 8 + length])  # the first counts
         start += 8 + length
     if JSON_CHUNK not in chunks:
-        raise InputError(f"{path}: the GLB holds no JSON; export it again")
+        raise InputError(path, "the GLB holds no JSON", "export it again")
     return Gltf(_parse_json(path, chunks[JSON_CHUNK]), chunks.get(BIN_CHUNK, b""))
 
 
@@ -97,18 +97,18 @@ def _parse_json(path: Path, text: bytes) -> Json:
         header = json.loads(text)
     except (ValueError, RecursionError) as error:  # also what is not UTF-8
         raise InputError(
-            f"{path}: cannot be read as a mesh (its JSON is broken: {why(error)}); export it again"
+            path, f"cannot be read as a mesh (its JSON is broken: {why(error)})", "export it again"
         ) from error
     if not isinstance(header, dict) or not isinstance(header.get("asset"), dict):
-        raise InputError(f"{path}: cannot be read as a mesh (its JSON is not that of a glTF)")
+        raise InputError(path, "cannot be read as a mesh (its JSON is not that of a glTF)")
     version = str(header["asset"].get("version", "2.0"))
     if not version.startswith("2"):
-        raise InputError(f"{path}: is glTF {version}; convert it to glTF 2.0")
+        raise InputError(path, f"is glTF {version}", "convert it to glTF 2.0")
     try:
         _check_kinds(header, "")
     except (ValueError, RecursionError) as error:
         raise InputError(
-            f"{path}: cannot be read as a mesh ({why(error)}); export it again"
+            path, f"cannot be read as a mesh ({why(error)})", "export it again"
         ) from error
     return header
 

@@ -77,7 +77,7 @@ def load_mesh(path: Path, up_axis: UpAxis = "auto", unit_m: float = 1.0) -> Text
         with np.errstate(all="ignore"):  # what is not finite is refused below
             parts = _read_parts(path, gltf, unit_m * world_from_file, findings)
     except DAMAGE as error:
-        raise InputError(f"{path}: cannot be read as a mesh ({why(error)})") from error
+        raise InputError(path, f"cannot be read as a mesh ({why(error)})") from error
     mesh = TexturedMesh(parts, findings.sentences)
     checks.check_mesh(mesh, path)
     check_size(path, mesh)
@@ -114,8 +114,9 @@ def _read_parts(
         findings.note(f"part '{part.name}': nowhere opaque enough to be seen; left out")
     if hidden and not drawn:
         raise InputError(
-            f"{path}: is transparent everywhere by its materials, so nothing would be seen; make"
-            " them opaque, in an MTL by 'd 1'"
+            path,
+            "is transparent everywhere by its materials, so nothing would be seen",
+            "make them opaque, in an MTL by 'd 1'",
         )
     return drawn
 
@@ -152,7 +153,7 @@ def _read_gltf_parts(path: Path, gltf: Gltf, findings: Findings) -> Iterator[Pla
         findings.warn(f"declares {n_declared} triangles, of which {n_faces} could be read")
     instead = without_surface(gltf.header)
     if not n_faces and instead is not None:
-        raise InputError(f"{path}: {instead}")
+        raise InputError(path, instead)
     for node in nodes:
         file_from_part, name = scene.graph[node]
         geometry = scene.geometry[name]

@@ -52,7 +52,7 @@ def read_obj(path: Path, resolver: ReferenceResolver, findings: Findings) -> lis
     """
     text = parse_obj(path.read_bytes())
     if not len(text.counts):
-        raise InputError(f"{path}: {_what_instead(text)}")
+        raise InputError(path, _what_instead(text))
     _report(text, findings)
     library = _Library(path, resolver, findings)
     library.read(text)

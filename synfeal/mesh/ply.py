@@ -51,7 +51,7 @@ def read_ply(path: Path, resolver: ReferenceResolver, findings: Findings) -> lis
     vertices = _positions(text)
     polygons = _polygons(text, len(vertices), findings)
     if not len(polygons.counts):
-        raise InputError(f"{path}: {_what_instead(text, len(vertices))}")
+        raise InputError(path, _what_instead(text, len(vertices)))
     _report(text, findings)
     return _Reader(path, text, vertices, resolver, findings).parts(polygons)
 

@@ -65,8 +65,9 @@ class ReferenceResolver(FilePathResolver):  # type: ignore[misc]  # trimesh is u
                 return self._checked(name, path.read_bytes())
         if found:
             self._refusal = self._refusal or InputError(
-                f"{self._source}: refers to '{name}', which leads out of its folder and is not"
-                " read; put a copy beside the mesh and name that"
+                self._source,
+                f"refers to '{name}', which leads out of its folder and is not read",
+                "put a copy beside the mesh and name that",
             )
             raise self._refusal
         other = self._in_other_case(name)

@@ -52,7 +52,7 @@ def save_glb(path: Path, mesh: TexturedMesh, extras: Mapping[str, Any] | None = 
     """
     path = Path(path)
     if path.suffix.lower() != ".glb":
-        raise InputError(f"{path}: a scene is saved as binary glTF; the name must end in .glb")
+        raise InputError(path, "a scene is saved as binary glTF; the name must end in .glb")
     scene = trimesh.Scene()
     materials = _Materials()
     origin_m, step_m = storage_grid(mesh.bounds_m)

@@ -21,6 +21,7 @@ from synfeal.pairing.correspondence import (
     TOLERANCE,
     Array,
     DepthImage,
+    State,
     look_for,
     points_of_pixels,
 )
@@ -39,6 +40,12 @@ class Flow(NamedTuple):
 
     flow_px: NDArray[np.float32]
     state: NDArray[np.uint8]
+
+    @property
+    def is_visible(self) -> NDArray[np.bool_]:
+        """Pixels (H, W) whose point the other frame shows."""
+        visible: NDArray[np.bool_] = self.state == State.VISIBLE
+        return visible
 
 
 def flow_between(
@@ -77,13 +84,13 @@ def write_flows(path: Path, ab: Flow, ba: Flow) -> None:
         )
 
 
-def read_flows(path: Path) -> tuple[Flow, Flow]:
+def read_flows(path: Path | str) -> tuple[Flow, Flow]:
     """Read the flows of a pair: from a to b, and from b to a.
 
     Raises:
         InputError: The file is missing or no such file.
     """
-    remedy = "; run synfeal pairs --flow again"
+    remedy = "; run pairs with `flow=True` again"
     # A damaged archive is refused in every way there is.
     with read_as(path, "optical flow", Exception, remedy=remedy), np.load(path) as held:
         flow_ab, state_ab, flow_ba, state_ba = (held[name] for name in ARRAYS)

@@ -75,7 +75,7 @@ class DepthFrames:
         return read_depth_m(
             self.frames[index].path(DEPTH),
             size=(self.camera.width, self.camera.height),
-            remedy="; give the camera of these images with --camera",
+            remedy="; give the camera of these images with `camera`",
         )
 
 
@@ -96,7 +96,7 @@ def read_depth_frames(
     """
     sequences = list_sequences(dataset)
     if DEPTH not in kinds_of(sequences):
-        raise InputError(f"{dataset}: has no depth images; collect it with --depth")
+        raise InputError(dataset, "has no depth images", "collect it with `depth=True`")
     camera = camera_of_dataset(dataset, camera_file)
     if camera.assumed:
         log.warning("%s: says nothing of its camera; that of 7-Scenes is assumed", dataset)

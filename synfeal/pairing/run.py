@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.dataset.depth_agreement import check_depth
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.poses import pose_error
 from synfeal.pairing.choose import Choice
 from synfeal.pairing.correspondence import TOLERANCE, DepthImage, State
@@ -84,18 +84,23 @@ class PairsJob:
         for name in ("min_overlap", "max_overlap"):
             value = getattr(self.choice, name)
             if not 0.0 <= value <= 1.0:
-                raise InputError(f"--{name.replace('_', '-')}: must be 0 to 1, found {value:g}")
+                raise InputError(Argument(name), f"must be 0 to 1, found {value:g}")
         if self.choice.min_overlap > self.choice.max_overlap:
-            raise InputError("--min-overlap: must not be above --max-overlap")
+            raise InputError(Argument("min_overlap"), "must not be above `max_overlap`")
         if self.choice.per_frame is not None and self.choice.per_frame < 1:
-            raise InputError(f"--per-frame: must be at least 1, found {self.choice.per_frame}")
+            raise InputError(
+                Argument("per_frame"), f"must be at least 1, found {self.choice.per_frame}"
+            )
         if self.every < 1:
-            raise InputError(f"--stride: must be at least 1, found {self.every}")
+            raise InputError(Argument("stride"), f"must be at least 1, found {self.every}")
         if not 0.0 < self.tolerance < 1.0:
-            raise InputError(f"--tolerance: must be above 0 and below 1, found {self.tolerance:g}")
+            raise InputError(
+                Argument("tolerance"), f"must be above 0 and below 1, found {self.tolerance:g}"
+            )
         if not all(2 <= side <= 8192 for side in self.grid):
             raise InputError(
-                f"--grid: each side must be 2 to 8192, found {self.grid[0]} {self.grid[1]}"
+                Argument("grid"),
+                f"each side must be 2 to 8192, found {self.grid[0]} {self.grid[1]}",
             )
 
 
@@ -128,18 +133,20 @@ def find_pairs(job: PairsJob) -> Found:
     frames = read_depth_frames(job.dataset, splits, job.camera_file, job.every)
     if job.flow and not frames.is_color:
         raise InputError(
-            f"--flow: the depth images of {job.dataset} are of another camera than its colour"
-            " images; give the camera of both with --camera"
+            Argument("flow"),
+            f"the depth images of {job.dataset} are of another camera than its colour images",
+            "give the camera of both with `camera`",
         )
     groups = _groups(frames, job.among)
     if len(frames) > MOST_FRAMES:
         raise InputError(
-            f"{job.dataset}: has {len(frames)} frames, and at most {MOST_FRAMES} are compared;"
-            f" give --stride {math.ceil(job.every * len(frames) / MOST_FRAMES)}"
+            job.dataset,
+            f"has {len(frames)} frames, and at most {MOST_FRAMES} are compared",
+            f"give `stride={math.ceil(job.every * len(frames) / MOST_FRAMES)}`",
         )
     _refuse_fine_grid(job.grid, frames)
     if not any(len(group) > 1 for group in groups):
-        raise InputError(f"{job.dataset}: has no two frames to compare; give another --among")
+        raise InputError(job.dataset, "has no two frames to compare", "give another `among`")
     if frames.camera.projection is None:
         check_depth(frames.posed_depth)
     with atomic_directory(job.out) as directory:
@@ -160,23 +167,26 @@ def _refuse_fine_grid(grid: tuple[int, int], frames: DepthFrames) -> None:
     (columns, rows), camera = grid, frames.camera
     if columns > camera.width or rows > camera.height:
         raise InputError(
-            f"--grid: {columns} x {rows} points are finer than the {camera.width} x"
-            f" {camera.height} pixels of a frame; give fewer"
+            Argument("grid"),
+            f"{columns} x {rows} points are finer than the {camera.width} x {camera.height} pixels"
+            " of a frame",
+            "give fewer",
         )
     if (count := columns * rows * len(frames)) > MOST_POINTS:
         raise InputError(
-            f"--grid: {count:.2g} points of {len(frames)} frames are more than {MOST_POINTS:.0e};"
-            " give fewer, or --stride"
+            Argument("grid"),
+            f"{count:.2g} points of {len(frames)} frames are more than {MOST_POINTS:.0e}",
+            "give fewer, or `stride`",
         )
 
 
-def read_pairs(path: Path) -> pd.DataFrame:
+def read_pairs(path: Path | str) -> pd.DataFrame:
     """Read ``pairs.csv`` of a directory of pairs, or the file itself.
 
     Raises:
         InputError: It is missing or no such table.
     """
-    file = path / TABLE if path.is_dir() else path
+    file = Path(path) / TABLE if Path(path).is_dir() else Path(path)
     return read_frame(file, SCHEMA, "run synfeal pairs again")
 
 

@@ -21,7 +21,7 @@ from synfeal.config.load import describe
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.dataset.world import ScanRecord, read_scan_record
-from synfeal.errors import InputError, SettingError, read_as
+from synfeal.errors import Argument, InputError, read_as
 from synfeal.geometry.axes import meant_poses
 from synfeal.geometry.poses import inverse
 from synfeal.geometry.rotations import BODY_FROM_CAM
@@ -134,7 +134,7 @@ def _camera(sequence: Path, record: ScanRecord | None) -> CameraConfig | None:
     try:
         return CameraConfig.model_validate(values)
     except ValidationError as error:
-        raise InputError(f"{path}: camera: {describe(error)}") from error
+        raise InputError(path, f"camera: {describe(error)}") from error
 
 
 def resized(camera: CameraConfig, width: int | None, height: int | None) -> CameraConfig:
@@ -151,17 +151,17 @@ def resized(camera: CameraConfig, width: int | None, height: int | None) -> Came
             panorama.
     """
     if camera.projection is not None:
-        raise SettingError(
-            "like",
-            f"its camera is {camera.projection}; give a calibration, or projection and field of"
-            " view",
+        raise InputError(
+            Argument("like"),
+            f"its camera is {camera.projection}",
+            "give a calibration, or projection and field of view",
         )
     fx, fy, cx, cy = camera.intrinsics
     lens = Calibration(camera.width, camera.height, fx, fy, cx, cy, camera.distortion)
     try:
         small = lens.scaled(width, height)
     except ValueError as error:
-        raise SettingError("width", f"the camera to be like {error}") from error
+        raise InputError(Argument("width"), f"the camera to be like {error}") from error
     return camera.model_copy(
         update={
             "width": small.width,

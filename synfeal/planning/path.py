@@ -182,8 +182,9 @@ def independent_poses(space: PoseSpace, collection: CollectionConfig, n_frames: 
         n_empty = 0 if len(kept[-1]) else n_empty + 1
         if n_empty >= most_empty:
             raise InputError(
-                f"plan: no admissible pose among {n_empty * BLOCK} candidates that looks farther"
-                f" than min_view_distance_m ({space.min_view_distance_m} m){space.also_asked};"
-                " lower it, or widen sampling_box"
+                "plan",
+                f"no admissible pose among {n_empty * BLOCK} candidates that looks farther than"
+                f" min_view_distance_m ({space.min_view_distance_m} m){space.also_asked}",
+                "lower it, or widen sampling_box",
             )
     return np.concatenate(kept)[:n_frames]

@@ -139,21 +139,24 @@ def plan_split(
             poses to repeat cannot be read or are too few.
     """
     if n_frames < 1:
-        raise InputError(f"plan: {n_frames} frames asked for; at least 1 is needed")
+        raise InputError("plan", f"{n_frames} frames asked for; at least 1 is needed")
     if collection.repeat is not None:
         return repeated_poses(collection.repeat, split, n_frames, caster.bounds_m)
     boxes = np.reshape(boxes, (-1, 2, 3))
     longest_m = float(np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1).max())
     if collection.mode == "path" and collection.frame_spacing_m > longest_m:
         raise InputError(
-            f"plan: the frame spacing ({collection.frame_spacing_m:g} m) is longer than any path in"
-            f" the sampling box ({longest_m:.3g} m across); lower it"
+            "plan",
+            f"the frame spacing ({collection.frame_spacing_m:g} m) is longer than any path in the"
+            f" sampling box ({longest_m:.3g} m across)",
+            "lower it",
         )
     if collection.mode == "path" and longest_m / collection.frame_spacing_m > MOST_OF_PATH:
         raise InputError(
-            f"plan: a path across the sampling box ({longest_m:.3g} m) would have more than"
-            f" {MOST_OF_PATH} frames; raise the frame spacing ({collection.frame_spacing_m:g} m),"
-            " or give another unit_m"
+            "plan",
+            f"a path across the sampling box ({longest_m:.3g} m) would have more than"
+            f" {MOST_OF_PATH} frames",
+            f"raise the frame spacing ({collection.frame_spacing_m:g} m), or give another unit_m",
         )
     # One generator for each box, so that none shifts another's numbers.
     generators = [rng] if len(boxes) == 1 else rng.spawn(len(boxes))
@@ -268,10 +271,11 @@ def _stuck(at: Array, space: PoseSpace, collection: CollectionConfig) -> InputEr
     """Return the error that no path leads on from a pose vector (6,)."""
     where = ", ".join(f"{value:.2f}" for value in at[:3])
     return InputError(
-        f"plan: no admissible target from ({where}) in {collection.max_tries} rounds of"
-        f" {collection.candidates} candidates; lower min_path_m ({collection.min_path_m} m)"
-        f" or min_view_distance_m ({space.min_view_distance_m} m){_or_clearance(space)},"
-        " or widen the sampling box"
+        "plan",
+        f"no admissible target from ({where}) in {collection.max_tries} rounds of"
+        f" {collection.candidates} candidates",
+        f"lower min_path_m ({collection.min_path_m} m) or min_view_distance_m"
+        f" ({space.min_view_distance_m} m){_or_clearance(space)}, or widen the sampling box",
     )
 
 

@@ -42,7 +42,7 @@ def repeated_poses(
     """
     table = read_poses(source, split)
     if len(table) < n_frames:
-        raise InputError(f"{source}: holds {len(table)} {split} poses; {n_frames} are asked for")
+        raise InputError(source, f"holds {len(table)} {split} poses; {n_frames} are asked for")
     table = table.first(n_frames)
     _warn_of_heads(source, table)
     lower, upper = mesh_bounds_m
@@ -87,8 +87,9 @@ def read_poses(source: Path, split: str) -> PoseTable:
         return _read_frames(read_split(source, split), source)
     if split != "train":
         raise InputError(
-            f"{source}: holds one list of poses, which is for training frames; for others name a"
-            " directory with train.csv and test.csv, or with TrainSplit.txt and TestSplit.txt"
+            source,
+            "holds one list of poses, which is for training frames; for others name a directory"
+            " with train.csv and test.csv, or with TrainSplit.txt and TestSplit.txt",
         )
     if source.is_dir():
         return _read_frames([source], source)
@@ -96,7 +97,7 @@ def read_poses(source: Path, split: str) -> PoseTable:
         return _read_table(source)
     if source.suffix == ".txt":
         return _read_tum(source)
-    raise InputError(f"{source}: must be a directory, a .csv pose table or a .txt TUM trajectory")
+    raise InputError(source, "must be a directory, a .csv pose table or a .txt TUM trajectory")
 
 
 def _read_table(path: Path) -> PoseTable:
@@ -109,11 +110,11 @@ def _read_table(path: Path) -> PoseTable:
 def _read_frames(directories: list[Path], source: Path) -> PoseTable:
     """Read the poses of 7-Scenes sequences, each a path."""
     if not directories:
-        raise InputError(f"{source}: the list of its sequences is empty")
+        raise InputError(source, "the list of its sequences is empty")
     files = [list_sequence(directory).files(POSE) for directory in directories]
     for directory, sequence in zip(directories, files, strict=True):
         if not sequence:
-            raise InputError(f"{directory}: holds no frame-XXXXXX.{POSE}; render it again")
+            raise InputError(directory, f"holds no frame-XXXXXX.{POSE}", "render it again")
     poses = np.array([_rigid(path) for sequence in files for path in sequence])
     path = np.repeat(np.arange(len(files)), [len(sequence) for sequence in files])
     return PoseTable(np.arange(len(poses)), path, poses[:, :3, 3].copy(), quat_wxyz_of(poses))

@@ -258,9 +258,10 @@ def largest_group(space: PoseSpace, max_tries: int, n_poses: int) -> PoseVectors
             break
     if not len(found):
         raise InputError(
-            f"plan: no pose in the sampling box looks farther than min_view_distance_m"
-            f" ({space.min_view_distance_m} m){space.also_asked}; lower it, or check sampling_box,"
-            " unit_m and up_axis"
+            "plan",
+            "no pose in the sampling box looks farther than min_view_distance_m"
+            f" ({space.min_view_distance_m} m){space.also_asked}",
+            "lower it, or check sampling_box, unit_m and up_axis",
         )
     group = seeing_groups(space.caster, found[:, :3])
     largest: PoseVectors = found[group == np.bincount(group).argmax()]

@@ -17,7 +17,7 @@ from typing import Any
 
 import yaml
 
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 
 # Names of what is being written begin so, then say by which process: nobody else's files do.
 UNFINISHED = ".synfeal-unfinished"
@@ -116,16 +116,18 @@ def refuse_inside(out: Path, dataset: Path) -> None:
     """Refuse to write into a data set itself, whose files would no longer be its own."""
     if lies_in(out, dataset):
         raise InputError(
-            f"--out: {out} lies in the data set {dataset} itself; choose a place beside it"
+            Argument("out"),
+            f"{out} lies in the data set {dataset} itself",
+            "choose a place beside it",
         )
 
 
 def refuse_existing(path: Path) -> None:
     """Refuse to write where there is something already."""
     if path.is_symlink() and not path.exists():
-        raise InputError(f"{path}: is a link that leads nowhere; choose another directory")
+        raise InputError(path, "is a link that leads nowhere", "choose another directory")
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
-        raise InputError(f"{path}: exists and is not empty; delete it or choose another directory")
+        raise InputError(path, "exists and is not empty", "delete it or choose another directory")
 
 
 def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
@@ -137,13 +139,14 @@ def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
         origin: What writes them, for messages, as in "is not from a comparison".
     """
     if os.path.lexists(out) and not out.is_dir():
-        raise InputError(f"{out}: is a file; choose another directory with --out")
+        raise InputError(out, "is a file", "choose another directory with `out`")
     names = sorted(path.name for path in out.glob("*"))
     others = [name for name in names if name not in own and not name.startswith(UNFINISHED)]
     if others:
         raise InputError(
-            f"{out}: holds '{others[0]}', which is not from {origin}; choose another directory"
-            " with --out"
+            out,
+            f"holds '{others[0]}', which is not from {origin}",
+            "choose another directory with `out`",
         )
 
 
@@ -156,8 +159,8 @@ def writing_to(path: Path, remedy: Callable[[], str]) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        name, reason = error.filename or path, error.strerror or error
-        raise InputError(f"{name}: {reason}; {remedy()}") from error
+        name, reason = error.filename or path, error.strerror or str(error)
+        raise InputError(name, reason, remedy()) from error
 
 
 @contextmanager

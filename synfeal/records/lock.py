@@ -42,7 +42,7 @@ def begin_run(root: Path) -> None:
         _end_future(root)
     except OSError as error:
         raise InputError(
-            f"{error.filename or root}: {error.strerror}; nothing was started"
+            error.filename or root, f"{error.strerror}; nothing was started"
         ) from error
     remove_unfinished(root)
 
@@ -128,7 +128,7 @@ def _lock(path: Path, directory: Path | None = None) -> FileLock:
     except Timeout as error:
         holder = path.read_text(errors="replace") or "it did not say which"
         raise InputError(
-            f"{directory}: another run is at work there ({holder}); wait for its end, or end it"
+            directory, f"another run is at work there ({holder}); wait for its end, or end it"
         ) from error
     except OSError as error:  # some network file systems know no locks
         print(f"{path}: {error.strerror}; see yourself that no other run starts", file=sys.stderr)

@@ -106,7 +106,7 @@ def read_records(
     table = parse_cells(path, text, remedy=remedy, sep=sep)
     absent = [name for name in needed if name not in table.header]
     if absent:
-        raise InputError(f"{path}: column {', '.join(absent)} missing; {remedy}")
+        raise InputError(path, f"column {', '.join(absent)} missing", remedy)
     table.check_rows()
     rows = zip(table.lines, table.rows, strict=True)
     return [(line, dict(zip(table.header, row, strict=True))) for line, row in rows]
@@ -138,11 +138,11 @@ class Cells:
         """
         twice = [name for i, name in enumerate(self.header) if name in self.header[:i]]
         if twice:
-            raise InputError(f"{self.path}: column {twice[0]} appears twice; {self.remedy}")
+            raise InputError(self.path, f"column {twice[0]} appears twice", self.remedy)
         for line, row in zip(self.lines, self.rows, strict=True):
             if len(row) != len(self.header):
                 found = f"has {len(row)} cells where the header has {len(self.header)}"
-                raise InputError(f"{self.path}: row {line}: {found}; {self.remedy}")
+                raise InputError(self.path, f"row {line}: {found}", self.remedy)
 
     def numbers(self, names: Sequence[str], may_be_empty: bool = False) -> NDArray[np.float64]:
         """Return the values (N, C) of some columns.
@@ -338,10 +338,10 @@ def read_numbers(
     has_text = bool(passed_over) and table.header[-1:] == (passed_over,)
     if table.header != (*columns, *([passed_over] if has_text else [])):
         found = ",".join(table.header)
-        raise InputError(f"{path}: header must be '{header}', found '{found[:80]}'")
+        raise InputError(path, f"header must be '{header}', found '{found[:80]}'")
     table.check_rows()
     values = table.numbers(columns)
     if finite and not np.isfinite(values).all():
         bad = int(np.argmin(np.isfinite(values).all(axis=1)))
-        raise InputError(f"{path}: row {bad + 2} holds a value that is not finite")
+        raise InputError(path, f"row {bad + 2} holds a value that is not finite")
     return values

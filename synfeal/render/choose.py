@@ -14,7 +14,7 @@ from pkgutil import resolve_name
 import numpy as np
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
-from synfeal.errors import InputError, SettingError
+from synfeal.errors import Argument, InputError
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.render.base import Renderer, UnavailableError
 
@@ -67,8 +67,8 @@ def open_renderer(
     name = fastest_working() if render.backend == "auto" else render.backend
     failure = why_not(name)
     if failure is not None:
-        raise SettingError(
-            "backend", f"{render.backend} does not work here: {failure}; or choose auto"
+        raise InputError(
+            Argument("backend"), f"{render.backend} does not work here: {failure}", "or choose auto"
         )
     return BACKENDS[name](mesh, camera, render)
 
@@ -88,7 +88,7 @@ def fastest_working() -> str:
             return name
         log.warning("backend: %s does not work here: %s", name, failure)
         failures.append(f"{name}: {failure}")
-    raise SettingError("backend", f"no renderer works here: {'; '.join(failures)}")
+    raise InputError(Argument("backend"), f"no renderer works here: {'; '.join(failures)}")
 
 
 @functools.cache

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from synfeal.camera.projection import pixels_per_radian, rays_of_pixels
 from synfeal.config.dataset import CameraConfig
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.render.base import Depth, Faces, Renderer, Rgb, Window
 from synfeal.render.distorted import (
     LONGEST_SIDE_PX,
@@ -181,8 +181,10 @@ def face_camera(camera: CameraConfig) -> CameraConfig:
     scale = min(OVERSAMPLING, (LONGEST_SIDE_PX / 2 - MARGIN_PX) / finest)
     if scale < 1.0:
         raise InputError(
-            f"camera: faces of a cube with the {finest:.0f} pixels per radian of the image have"
-            f" more than {LONGEST_SIDE_PX} pixels a side; give a smaller width"
+            Argument("camera"),
+            f"faces of a cube with the {finest:.0f} pixels per radian of the image have more than"
+            f" {LONGEST_SIDE_PX} pixels a side",
+            "give a smaller width",
         )
     focal = finest * scale
     side = max(16, 2 * (int(np.ceil(focal)) + MARGIN_PX))

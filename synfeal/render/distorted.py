@@ -17,7 +17,7 @@ from scipy import sparse
 
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.render.base import Depth, Faces, Renderer, Rgb
 
 Array = NDArray[np.float64]
@@ -93,8 +93,10 @@ def covering_camera(camera: CameraConfig) -> CameraConfig:
     scale = min(OVERSAMPLING, (LONGEST_SIDE_PX - 2 * MARGIN_PX - 2) / extent.max())
     if scale < 1.0:
         raise InputError(
-            f"distortion: the lens sees so much that a pinhole needs {extent.max():.0f} pixels for"
-            f" it, more than {LONGEST_SIDE_PX}; give a smaller width"
+            Argument("distortion"),
+            f"the lens sees so much that a pinhole needs {extent.max():.0f} pixels for it, more"
+            f" than {LONGEST_SIDE_PX}",
+            "give a smaller width",
         )
     focal = np.array([fx, fy]) * scale
     low = np.floor(edge.min(axis=0) * focal) - MARGIN_PX

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.config.dataset import CameraConfig, RenderConfig
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import TexturedMesh
 from synfeal.render.base import (
@@ -122,8 +122,10 @@ class OpenglRenderer(Renderer):
         limit = context.info["GL_MAX_TEXTURE_SIZE"]
         if max(large) > limit:
             raise InputError(
-                f"camera: {size[0]}x{size[1]} pixels at {supersampling} samples per axis are more"
-                f" than the {limit} OpenGL draws here; lower render.supersampling"
+                Argument("camera"),
+                f"{size[0]}x{size[1]} pixels at {supersampling} samples per axis are more than the"
+                f" {limit} OpenGL draws here",
+                "lower render.supersampling",
             )
         self._samples = context.texture(large, 4)
         depths = (context.depth_renderbuffer(large), context.depth_renderbuffer(size))

@@ -22,7 +22,7 @@ from synfeal.dataset.frame_files import FrameFile
 from synfeal.dataset.images import read_rgb
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import PosedFrames
-from synfeal.errors import InputError, read_as
+from synfeal.errors import Argument, InputError, read_as
 from synfeal.geometry.poses import pose_matrix
 from synfeal.records.files import read_json
 
@@ -196,9 +196,10 @@ def rgbd_camera(
     if base is None:
         if color is None:
             raise InputError(
-                f"{sequence}: nothing says what its cameras are; give --preset"
-                f" ({', '.join(PRESETS)}), --color-camera FILE or --color-focal PX, and the same"
-                " for depth where depth is not registered to colour"
+                sequence,
+                "nothing says what its cameras are",
+                f"give `preset` ({', '.join(PRESETS)}), `color_camera=FILE` or `color_focal_px=PX`,"
+                " and the same for depth where depth is not registered to colour",
             )
         units = TUM_UNITS_PER_M if is_tum else MILLIMETRES
         base = RgbdCamera(color, depth or color, np.eye(4), units, "options")
@@ -206,17 +207,20 @@ def rgbd_camera(
         base = replace(base, color=color or base.color, depth=depth or base.depth, source="options")
     if options.depth_from_color is not None:
         if not np.isfinite(options.depth_from_color).all():
-            raise InputError("--depth-from-color: must be six finite numbers")
+            raise InputError(Argument("depth_from_color"), "must be six finite numbers")
         if np.abs(options.depth_from_color[3:]).max() > MOST_ASIDE_M:
             raise InputError(
-                f"--depth-from-color: X Y Z must be within {MOST_ASIDE_M:g} m, which no two cameras"
-                " of one device are apart"
+                Argument("depth_from_color"),
+                f"X Y Z must be within {MOST_ASIDE_M:g} m, which no two cameras of one device are"
+                " apart",
             )
         turn = Rotation.from_rotvec(options.depth_from_color[:3], degrees=True).as_matrix()
         base = replace(base, depth_from_color=pose_matrix(turn, options.depth_from_color[3:]))
     if options.depth_units_per_m is not None:
         if not 0 < options.depth_units_per_m < np.inf:
-            raise InputError(f"--depth-scale: must be above 0, found {options.depth_units_per_m:g}")
+            raise InputError(
+                Argument("depth_scale"), f"must be above 0, found {options.depth_units_per_m:g}"
+            )
         base = replace(base, depth_units_per_m=options.depth_units_per_m)
     _check_size(sequence, base.color, color_size, "color")
     _check_size(sequence, base.depth, depth_size, "depth")
@@ -228,31 +232,35 @@ def _one(
 ) -> CameraConfig | None:
     """Return the camera given as a file or a focal length; None where neither is given."""
     if file is not None and focal_px is not None:
-        raise InputError(f"--{kind}-focal: comes from --{kind}-camera too; leave one of them out")
+        raise InputError(
+            Argument(f"{kind}_focal_px"), f"comes from `{kind}_camera` too", "leave one of them out"
+        )
     if file is not None:
         try:
             camera = CameraConfig.model_validate(
                 {"calibration": file, "width": size[0], "height": size[1]}
             )
         except ValidationError as error:
-            raise InputError(f"--{kind}-camera: {describe(error)}") from error
-        _refuse_wide(camera, f"--{kind}-camera: {file}")
+            raise InputError(Argument(f"{kind}_camera"), describe(error)) from error
+        _refuse_wide(camera, Argument(f"{kind}_camera"), f"{file}: ")
         return camera
     if focal_px is not None:
         if not 0 < focal_px < 1e5:
             raise InputError(
-                f"--{kind}-focal: must be above 0 and below 1e5 pixels, found {focal_px:g}"
+                Argument(f"{kind}_focal_px"),
+                f"must be above 0 and below 1e5 pixels, found {focal_px:g}",
             )
         return pinhole(*size, focal_px)
     return None
 
 
-def _refuse_wide(camera: CameraConfig, name: str) -> None:
+def _refuse_wide(camera: CameraConfig, where: Argument | Path, name: str = "") -> None:
     """Refuse a fisheye or a panorama: depth is fused as that of a perspective camera."""
     if camera.projection is not None:
         raise InputError(
-            f"{name}: is a camera of projection {camera.projection}, and a perspective one is"
-            " needed; undistort the images first"
+            where,
+            f"{name}is a camera of projection {camera.projection}, and a perspective one is needed",
+            "undistort the images first",
         )
 
 
@@ -282,7 +290,7 @@ def _of_manifest(sequence: Path) -> RgbdCamera | None:
     with read_as(path, "a manifest"):
         values = read_json(path)
         camera = CameraConfig.model_validate(values.get("camera", values))
-    _refuse_wide(camera, str(path))
+    _refuse_wide(camera, path)
     units_per_m = camera.depth_units_per_m or MILLIMETRES
     return RgbdCamera(camera, camera, np.eye(4), units_per_m, MANIFEST)
 
@@ -291,7 +299,8 @@ def _check_size(sequence: Path, camera: CameraConfig, size: tuple[int, int], kin
     """Check that a camera is that of the first image of a kind."""
     if (camera.width, camera.height) != size:
         raise InputError(
-            f"{sequence}: the first {kind} image is of {size[0]}x{size[1]} pixels, its camera of"
-            f" {camera.width}x{camera.height}; give the calibration of these images with"
-            f" --{kind}-camera"
+            sequence,
+            f"the first {kind} image is of {size[0]}x{size[1]} pixels, its camera of"
+            f" {camera.width}x{camera.height}",
+            f"give the calibration of these images with `{kind}_camera`",
         )

@@ -68,7 +68,9 @@ def colors_of(
         on_frame()
     known = weight > 0
     if not known.any():
-        raise InputError("scan: no photograph shows the surface; check --preset or --color-camera")
+        raise InputError(
+            "scan", "no photograph shows the surface", "check `preset` or `color_camera`"
+        )
     colors = np.zeros((len(points), 3), np.float32)
     colors[known] = total[known] / weight[known, None]
     if not known.all():

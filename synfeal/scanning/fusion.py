@@ -96,7 +96,9 @@ def fuse(
         import open3d as o3d
     except ImportError as error:
         raise InputError(
-            f"scan: needs Open3D, which does not load here ({error}); pip install 'synfeal[scan]'"
+            "scan",
+            f"needs Open3D, which does not load here ({error})",
+            "pip install 'synfeal[scan]'",
         ) from error
     kind, scalar = o3d.core.float32, o3d.core.SizeVector([1])
     grid = o3d.t.geometry.VoxelBlockGrid(
@@ -118,8 +120,10 @@ def fuse(
             fuse_depth(grid, image, matrix, cam_from_world, max_depth_m, TRUNCATION_VOXELS)
         on_frame()
     nothing = InputError(
-        f"scan: no surface within {max_depth_m:g} m is seen by two frames; give a smaller --stride,"
-        " a larger --max-depth, or --depth-scale if depth is not in millimetres"
+        "scan",
+        f"no surface within {max_depth_m:g} m is seen by two frames",
+        "give a smaller `stride`, a larger `max_depth_m`, or `depth_scale` if depth is not in"
+        " millimetres",
     )
     try:
         mesh = grid.extract_triangle_mesh(MIN_WEIGHT)

@@ -26,7 +26,9 @@ WINDOWS_DEG = (8.0, 5.0, 3.0, 2.0, 2.0, 2.0)
 # over all directions 3.6 % are), and share that must hold up where it is: level planes do, and the
 # lesser of two walls, but one wall leaves the rotation about its normal free.
 MIN_AGREEING, MIN_HOLDING = 0.12, 0.02
-REMEDY = "give --gravity X Y Z, the way things fall in the world of the poses, or --keep-axes"
+REMEDY = (
+    "give `gravity=(X, Y, Z)`, the way things fall in the world of the poses, or `keep_axes=True`"
+)
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ def find_gravity(surface: FusedSurface, world_from_cam: Array) -> Gravity:
     """
     guess = -world_from_cam[:, :3, 1].mean(axis=0)
     if np.linalg.norm(guess) < 0.3:
-        raise InputError(f"scan: the photographs are turned all ways, so up is not known; {REMEDY}")
+        raise InputError("scan", "the photographs are turned all ways, so up is not known", REMEDY)
     guess /= np.linalg.norm(guess)
     normals = area_weighted_normals(surface, SAMPLES)
     tried = _directions_near(guess)
@@ -78,8 +80,10 @@ def find_gravity(surface: FusedSurface, world_from_cam: Array) -> Gravity:
     )
     if holding < MIN_HOLDING or found.level + found.plumb < MIN_AGREEING:
         raise InputError(
-            f"scan: no gravity found: {found.level:.1%} of the surface is level and"
-            f" {found.plumb:.1%} plumb at the best; {REMEDY}"
+            "scan",
+            f"no gravity found: {found.level:.1%} of the surface is level and {found.plumb:.1%}"
+            " plumb at the best",
+            REMEDY,
         )
     return found
 

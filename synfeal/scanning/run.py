@@ -18,7 +18,7 @@ from synfeal.dataset.depth_agreement import DepthAgreement, best_focal_px, check
 from synfeal.dataset.images import image_size
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
 from synfeal.dataset.world import MESH_SHA256, SCAN
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.axes import PosesAre, meant_poses
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import MeshPart, TexturedMesh
@@ -41,7 +41,7 @@ from synfeal.scanning.gravity import find_gravity, upright_world
 from synfeal.scanning.picture import Comparison, compare, write_picture
 
 Array = NDArray[np.float64]
-OPTIONS = frozenset({"--convention", "--depth-scale"})
+OPTIONS = frozenset({"convention", "depth_scale"})
 COMPARED = 24  # photographs that the scan is compared with
 # Beyond, a focal length is not that of the camera: tolerances of lenses are a tenth of it.
 WRONG_FOCAL = 0.03
@@ -88,24 +88,26 @@ class ScanJob:
     def check(self) -> None:
         """Refuse numbers that mean nothing."""
         if self.out.suffix.lower() != ".glb":
-            raise InputError(f"--out: {self.out}: a scan is binary glTF; end its name in .glb")
+            raise InputError(
+                Argument("out"), f"{self.out}: a scan is binary glTF", "end its name in .glb"
+            )
         if self.start < 0 or (self.stop is not None and self.stop <= self.start):
-            raise InputError(f"--range: {self.start} to {self.stop} holds no frame")
+            raise InputError(Argument("range"), f"{self.start} to {self.stop} holds no frame")
         if self.stride < 1:
-            raise InputError(f"--stride: must be at least 1, found {self.stride}")
-        for flag, value in (
-            ("--voxel", self.voxel_m),
-            ("--max-depth", self.max_depth_m),
-        ):
+            raise InputError(Argument("stride"), f"must be at least 1, found {self.stride}")
+        for name, value in (("voxel_m", self.voxel_m), ("max_depth_m", self.max_depth_m)):
             if not 1e-4 <= value <= 1e3:
-                raise InputError(f"{flag}: must be 0.0001 to 1000 metres, found {value:g}")
+                raise InputError(Argument(name), f"must be 0.0001 to 1000 metres, found {value:g}")
         if not (np.isfinite(self.min_piece_m2) and self.min_piece_m2 >= 0):
-            raise InputError(f"--min-piece: must be 0 square metres or more, {self.min_piece_m2:g}")
+            raise InputError(
+                Argument("min_piece_m2"), f"must be 0 square metres or more, {self.min_piece_m2:g}"
+            )
         if not isinstance(self.gravity, str):
             longest = np.abs(self.gravity).max()
             if not 1e-6 <= longest <= 1e6:
                 raise InputError(
-                    "--gravity: must be three numbers, the largest 1e-6 to 1e6 without its sign"
+                    Argument("gravity"),
+                    "must be three numbers, the largest 1e-6 to 1e6 without its sign",
                 )
 
 
@@ -183,7 +185,7 @@ def _read(job: ScanJob) -> PosedFrames:
     every = read_posed_sequence(job.sequence, slice(job.start, job.stop))
     if not every.has_depth:
         raise InputError(
-            f"{job.sequence}: has no depth images; a scan is made of photographs with depth"
+            job.sequence, "has no depth images; a scan is made of photographs with depth"
         )
     return replace(every, world_from_cam=meant_poses(every.world_from_cam, job.poses_are))
 
@@ -252,15 +254,15 @@ def _tell(
         )
         if job.keep_calibration:
             log.warning(
-                "%s: give --color-focal %.0f, or leave out --keep-calibration", said, best.fx
+                "%s: give `color_focal_px=%.0f`, or leave out `keep_calibration`", said, best.fx
             )
         else:
-            log.warning("%s: %.0f px is used; --keep-calibration uses what is given", said, best.fx)
+            log.warning("%s: %.0f px is used; `keep_calibration` uses what is given", said, best.fx)
     covered = float(np.mean([one.covered.mean() for one in compared]))
     if covered < WARN_COVERED:
         log.warning(
             "scan: covers %.0f %% of what photographs show; give more frames, or a larger"
-            " --max-depth (%g m)",
+            " `max_depth_m` (%g m)",
             100 * covered,
             job.max_depth_m,
         )

@@ -35,9 +35,9 @@ Pixels = NDArray[Any]
 ONE_COLOR_FRAMES, EMPTY_FRAMES = "of one colour", "more than half empty"
 MOST = {ONE_COLOR_FRAMES: 0.05, EMPTY_FRAMES: 0.25}
 REMEDIES = {
-    ONE_COLOR_FRAMES: "look at preview.png; synfeal collect --min-clearance keeps cameras off"
-    " walls, --shade lights a mesh of plain colours",
-    EMPTY_FRAMES: "look at preview.png; synfeal collect --min-seen 0.9 refuses views past the mesh",
+    ONE_COLOR_FRAMES: "look at preview.png; collect with `min_clearance_m` keeps cameras off"
+    " walls, `shade` lights a mesh of plain colours",
+    EMPTY_FRAMES: "look at preview.png; collect with `min_seen=0.9` refuses views past the mesh",
 }
 
 

@@ -369,5 +369,5 @@ def test_frames_are_chosen_by_range_stride_and_number():
     spread = FrameChoice(most=4).rows(100)
     assert (spread[0], spread[-1], len(spread)) == (0, 99, 4)
     assert np.ptp(np.diff(spread)) <= 1
-    with pytest.raises(InputError, match="--range"):
+    with pytest.raises(InputError, match="range: "):
         FrameChoice(start=5, stop=5)

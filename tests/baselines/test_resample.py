@@ -179,5 +179,5 @@ def test_a_calibration_goes_before_exif_and_fits_the_photograph(tmp_path):
 
 @pytest.mark.parametrize("focal", [0.0, -3.0, float("nan"), float("inf")])
 def test_a_focal_length_that_is_none_is_refused(focal):
-    with pytest.raises(InputError, match=r"--focal: must be a positive number"):
+    with pytest.raises(InputError, match=r"focal_px: must be a positive number"):
         PhotographCamera.read(None, focal, exif=True)

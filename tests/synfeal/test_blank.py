@@ -83,7 +83,7 @@ def test_collect_always_says_how_many_pixels_are_empty(mesh, warns, tmp_path, ca
     assert f"empty pixels: {share:.1%}" in capsys.readouterr().out
     said = [line for line in caplog.messages if "will be empty" in line]
     assert bool(said) == warns
-    assert all("--box" in line for line in said)
+    assert all("`box`" in line for line in said)
 
 
 def test_what_helps_against_empty_pixels_is_not_what_was_given(tmp_path, caplog, monkeypatch):

@@ -244,7 +244,7 @@ def test_what_is_no_capture_is_told_what_one_is(tmp_path):
 def test_a_folder_that_is_two_captures_asks_which(tmp_path):
     path, _ = written("transforms", tmp_path)
     WRITERS["colmap"](path)
-    with pytest.raises(InputError, match="--format"):
+    with pytest.raises(InputError, match="`format`"):
         read_capture(path)
     assert read_capture(path, "colmap").format == "colmap"
     assert read_capture(path, "transforms").format == "transforms"

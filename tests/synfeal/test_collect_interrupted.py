@@ -133,7 +133,7 @@ def test_a_full_disk_is_one_line_and_the_collection_goes_on_when_there_is_room(
 
 OTHERS = {
     ("--seed", "1"): "--seed was 0, is 1",
-    ("--packed", "16"): "packed_px was None, is 16",
+    ("--packed", "16"): "--packed was None, is 16",
     ("--spacing", "0.3"): "--spacing was 0.2, is 0.3",
 }
 
@@ -143,7 +143,7 @@ def test_other_settings_and_commands_do_not_go_on_with_it(mesh, tmp_path, capfd)
     before = sorted(part.rglob("*"))
     other = save_room(tmp_path / "other.glb", seed=1)
     cases = [(mesh, more, words) for more, words in OTHERS.items()]
-    for used, more, words in [*cases, (other, [], "sha256 was ")]:
+    for used, more, words in [*cases, (other, [], "sha256` was ")]:
         capfd.readouterr()
         assert collect(used, tmp_path / "set", "--depth", *more) == 1
         assert words in (message := only_error(capfd))

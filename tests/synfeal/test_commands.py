@@ -1,6 +1,7 @@
 """Commands and functions have one name and the same words; those of the version before warn."""
 
 import inspect
+import pydoc
 from pkgutil import resolve_name
 
 import pytest
@@ -25,7 +26,7 @@ def room(tmp_path):
 
 def test_every_command_about_data_is_a_function():
     assert {"collect", "plan", "scan", "inspect", "export", "validate", "preview"} <= set(CALLED)
-    assert {"pairs", "evaluate", "train", "localize", "map"} <= set(CALLED)
+    assert {"pairs", "evaluate", "unpack", "train", "localize", "map"} <= set(CALLED)
 
 
 @pytest.mark.parametrize("name", CALLED)
@@ -33,8 +34,6 @@ def test_a_command_and_its_function_have_the_same_words(name):
     function = getattr(synfeal, name)
     assert function is resolve_name(CALLED[name].function)
     takes = set(inspect.signature(function).parameters)
-    if "options" in takes:
-        takes = takes - {"options"} | set(CollectOptions.__annotations__)
     options = {destination(flag, details) for flag, details in CALLED[name].options}
     # `plan` returns its poses, `validate` prints what it returns
     assert options - {"out"} == takes - {"out"}
@@ -51,6 +50,28 @@ def test_keywords_are_the_fields_of_the_configuration():
     fields = {**CollectConfig.model_fields, **LikeConfig.model_fields}
     assert set(CollectOptions.__annotations__) == set(fields) - {"mesh", "frames"}
     assert set(ViewOptions.__annotations__) == set(ViewConfig.model_fields)
+
+
+@pytest.mark.parametrize(
+    ("function", "models"),
+    [
+        (synfeal.collect, (CollectConfig, LikeConfig)),
+        (synfeal.plan, (CollectConfig, LikeConfig)),
+        (synfeal.Renderer.__init__, (ViewConfig,)),
+    ],
+)
+def test_help_shows_every_option_with_type_unit_and_default(function, models):
+    takes, text = inspect.signature(function).parameters, pydoc.render_doc(function)
+    for name, field in (item for model in models for item in model.model_fields.items()):
+        assert name in takes
+        assert f"{name}: " in text
+        if not field.is_required():
+            assert takes[name].default == field.default
+            assert takes[name].kind is inspect.Parameter.KEYWORD_ONLY
+    assert "options" not in takes
+    assert "background_rgb: 'tuple[int, int, int]' = (0, 0, 0)" in text
+    if function is not synfeal.Renderer.__init__:
+        assert "spacing_m: Distance between frames, metres; default 0.03." in text
 
 
 def test_settings_as_options_are_read_again_as_the_same_settings(room):

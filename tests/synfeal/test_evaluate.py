@@ -272,16 +272,16 @@ def test_frames_are_found_by_their_numbers_where_there_is_one_sequence(tmp_path)
         assert found.metrics["position_m_max"] == pytest.approx(0, abs=1e-9)
         assert found.frames.names[0] == "seq-03/frame-000000"
         assert len(found.frames.names) == count
-    with pytest.raises(InputError, match=r"0, 1, 2, .* give --rate 1"):
+    with pytest.raises(InputError, match=r"0, 1, 2, .* give `rate_hz=1`"):
         evaluate(dataset, tmp_path / "tum.txt", Settings())
-    with pytest.raises(InputError, match=r"^--rate: .*hloc.txt .* without times"):
+    with pytest.raises(InputError, match=r"^rate_hz: .*hloc.txt .* without times"):
         evaluate(dataset, tmp_path / "hloc.txt", Settings(rate_hz=30.0))
 
 
 @pytest.mark.parametrize("write", [foreign.write_tree, foreign.write_kitti])
 def test_matrices_have_no_order_of_quaternions(dataset, truth, tmp_path, write):
     poses = write(tmp_path / "poses", truth)
-    with pytest.raises(InputError, match=r"^--convention: .* of matrices"):
+    with pytest.raises(InputError, match=r"^convention: .* of matrices"):
         evaluate(dataset, poses, Settings(convention="world_from_cam-xyzw"))
     inverse = write(tmp_path / "inverse", np.linalg.inv(truth))
     found = evaluate(dataset, inverse, Settings(convention="cam_from_world-wxyz"))

@@ -237,10 +237,10 @@ def doubts(extents, **values):
         ((5000.0, 6000.0, 3000.0), 1.0, ["6e+03 m", "try --unit-m 0.001, 0.01 or 0.0254"]),
         ((500.0, 600.0, 300.0), 0.1, ["600 m", "try --unit-m 0.001, 0.01 or 0.0254"]),
         ((0.5, 0.4, 0.3), 1.0, ["0.5 m", "try --unit-m 10 or 100"]),
-        ((0.5, 0.4, 0.3), 0.001, ["0.5 m", "try --unit-m 0.01 or 0.0254"]),
+        ((0.5, 0.4, 0.3), 0.001, ["0.5 m", "try `unit_m=0.01 or 0.0254"]),
         ((6e7, 5e7, 4e7), 1.0, ["6e+07 m", "remove what lies far away"]),
         ((6e4, 5e4, 4e4), 0.001, ["6e+04 m", "remove what lies far away"]),
-        ((2e-4, 1e-4, 1e-4), 1.0, ["0.0002 m", "give --unit-m"]),
+        ((2e-4, 1e-4, 1e-4), 1.0, ["0.0002 m", "give `unit_m`"]),
         ((400.0, 400.0, 12.0), 1.0, ["400 m", "terrain or a town"]),
     ],
 )
@@ -249,7 +249,7 @@ def test_sizes_that_are_not_metres_are_doubted(extents, unit_m, words):
     found = doubts(extents, unit_m=unit_m)
     assert bool(found) == bool(words)
     assert all(word in found for word in words)
-    for named in re.findall(r"[0-9.]+", found.partition("--unit-m")[2]):
+    for named in re.findall(r"[0-9.]+", found.partition("unit_m")[2]):
         assert not doubts(np.array(extents) * float(named) / unit_m, unit_m=float(named))
 
 
@@ -262,7 +262,7 @@ def test_a_unit_is_assumed_only_where_it_makes_a_room(tmp_path, side, taken):
     assert scene.unit_m == taken
     assert bool(notes) == (taken != 1.0)
     found = doubts(np.ptp(mesh.bounds_m, axis=0), unit_m=scene.unit_m)
-    assert "--unit-m" not in found
+    assert "unit_m" not in found
     assert bool(found) == (side == 6e7)
 
 

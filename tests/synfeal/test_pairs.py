@@ -305,7 +305,7 @@ def test_a_set_without_depth_and_a_directory_that_is_not_empty_are_refused(
     assert "is not empty" in refused(capfd, "pairs", data_set, "--out", tmp_path / "full")
     with pytest.raises(InputError, match=r"pairs.csv"):
         read_pairs(tmp_path / "full")
-    with pytest.raises(InputError, match="run synfeal pairs --flow again"):
+    with pytest.raises(InputError, match="run pairs with `flow=True` again"):
         read_flows(tmp_path / "full" / "mine.txt")
 
 

@@ -127,13 +127,13 @@ def read_g2o(path: Path) -> PoseGraph:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a g2o file ({why(error)})") from error
+        raise InputError(path, f"cannot be read as a g2o file ({why(error)})") from error
     vertices: dict[int, Array] = {}
     edges: list[Edge] = []
     for number, line in enumerate(text.splitlines(), start=1):
         kind, *cells = line.split() or [""]
         if kind not in _CELLS:
-            raise InputError(f"{path}: line {number} is not a {_VERTEX} or {_EDGE} record")
+            raise InputError(path, f"line {number} is not a {_VERTEX} or {_EDGE} record")
         values = _numbers(cells, _CELLS[kind], f"{path}: line {number}")
         n_ids = 1 if kind == _VERTEX else 2
         whole_numbers(values[None, :n_ids], path)
@@ -151,15 +151,15 @@ def read_g2o(path: Path) -> PoseGraph:
 def _graph(vertices: dict[int, Array], edges: Sequence[Edge], path: Path) -> PoseGraph:
     """Build the graph after checking that nodes are numbered 0..n-1 and edges join two of them."""
     if sorted(vertices) != list(range(len(vertices))) or not vertices:
-        raise InputError(f"{path}: vertices must be numbered 0 to n-1 without a gap")
+        raise InputError(path, "vertices must be numbered 0 to n-1 without a gap")
     for edge in edges:
         if not (edge.i in vertices and edge.j in vertices and edge.i != edge.j):
-            raise InputError(f"{path}: edge {edge.i} {edge.j} must join two different vertices")
+            raise InputError(path, f"edge {edge.i} {edge.j} must join two different vertices")
     graph = PoseGraph(np.array([vertices[node] for node in range(len(vertices))]), tuple(edges))
     try:
         check_connected(graph)
     except ValueError as error:
-        raise InputError(f"{path}: {error}; is the file cut short? Make it again") from error
+        raise InputError(path, f"{error}; is the file cut short? Make it again") from error
     return graph
 
 
@@ -168,9 +168,9 @@ def _numbers(cells: Sequence[str], count: int, where: str) -> Array:
     try:
         values = np.array([float(cell) for cell in cells])
     except ValueError as error:
-        raise InputError(f"{where}: {why(error)}") from error
+        raise InputError(where, why(error)) from error
     if len(values) != count or not np.isfinite(values).all():
-        raise InputError(f"{where}: needs {count} finite numbers, found {len(values)}")
+        raise InputError(where, f"needs {count} finite numbers, found {len(values)}")
     return values
 
 

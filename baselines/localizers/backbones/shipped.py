@@ -33,8 +33,9 @@ def shipped_weights_path(name: BackboneName, directory: Path = SHIPPED) -> Path:
     """
     if name not in BACKBONES:
         raise InputError(
-            f"network.backbone: no weights of {name} are shipped, only of {', '.join(BACKBONES)};"
-            " choose googlenet, or make some with pretraining.source: rooms"
+            "network.backbone",
+            f"no weights of {name} are shipped, only of {', '.join(BACKBONES)}",
+            "choose googlenet, or make some with pretraining.source: rooms",
         )
     path = directory / f"{name}.safetensors"
     try:
@@ -42,10 +43,10 @@ def shipped_weights_path(name: BackboneName, directory: Path = SHIPPED) -> Path:
         found = hashlib.sha256(path.read_bytes()).hexdigest()
     except (OSError, ValueError, LookupError) as error:
         raise InputError(
-            f"{path}: cannot be read ({why(error)}); install the package again"
+            path, f"cannot be read ({why(error)})", "install the package again"
         ) from error
     if found != expected:
-        raise InputError(f"{path}: is not the file that was shipped; install the package again")
+        raise InputError(path, "is not the file that was shipped", "install the package again")
     return path
 
 

@@ -74,8 +74,9 @@ def load_backbone_weights(backbone: nn.Module, path: Path) -> None:
             raise
         unfit = str(error).splitlines()[1].strip()
         raise InputError(
-            f"{path}: does not fit {type(backbone).__name__} of this network.width ({unfit}); "
-            "train the backbone again, or set the width it was trained with"
+            path,
+            f"does not fit {type(backbone).__name__} of this network.width ({unfit})",
+            "train the backbone again, or set the width it was trained with",
         ) from error
 
 
@@ -86,14 +87,16 @@ def _download(url: str, path: Path) -> None:
             content = response.read()
     except OSError as error:
         raise InputError(
-            f"{path}: ImageNet weights are missing and {url} cannot be downloaded ({why(error)}); "
-            f"fetch it on a machine with a network and put it at {path}"
+            path,
+            f"ImageNet weights are missing and {url} cannot be downloaded ({why(error)})",
+            f"fetch it on a machine with a network and put it at {path}",
         ) from error
     found = hashlib.sha256(content).hexdigest()
     if not found.startswith(expected):
         raise InputError(
-            f"{path}: {url} answered with another file (SHA-256 begins {found[:8]}, "
-            f"expected {expected}); try again, or put the right file there"
+            path,
+            f"{url} answered with another file (SHA-256 begins {found[:8]}, expected {expected})",
+            "try again, or put the right file there",
         )
     with atomic_path(path) as temporary:
         temporary.write_bytes(content)
