@@ -51,6 +51,15 @@ COST_FLAGS = ("--profile", "--cores", "--measured", "--csv", "--compare")
         nargs="+",
         metavar="RESULTS",
     ),
+    option(
+        "--gpu",
+        "instead, the hours of training on one GPU, by rates of benchmarks/gpu.py"
+        " (results/benchmarks/gpu.csv)",
+        type=Path,
+        nargs="?",
+        const=Path("results/benchmarks/gpu.csv"),
+        metavar="RATES",
+    ),
     option("--csv", "write the plan as a table too", type=Path, metavar="FILE"),
     option(
         "--compare",
@@ -65,6 +74,15 @@ def cost(arguments: argparse.Namespace) -> None:
     from reproduction.plan.pace import PUBLISHED
     from reproduction.plan.plan import compare_text, plan_text
 
+    if arguments.gpu is not None:
+        from reproduction.design.profiles import read_profile
+        from reproduction.plan.gpu import gpu_text
+
+        for option_name in ("csv", "compare", "cores", "measured"):
+            if getattr(arguments, option_name):
+                raise InputError(f"--{option_name}: is of a plan on processors; leave out --gpu")
+        print(gpu_text(read_profile(arguments.profile), arguments.gpu), end="")
+        return
     measured = arguments.measured or PUBLISHED
     if arguments.compare is not None:
         text = compare_text(measured, arguments.compare, arguments.csv)

@@ -22,7 +22,7 @@ measured    {measured}
 CPU time    of a core like theirs; the sum is meant to be within a factor of 1.5 (docs/cost.md)
 wall time   rule after rule, a job on each core
 x measured  largest planned job over largest measured one; far above 1 is extrapolated
-training    on a GPU: divide the images by those that it trains in a second
+training    on these cores; on a GPU: --gpu
 """
 
 
