@@ -1,10 +1,12 @@
-r"""Errors of localizers trained on a GPU beside those of the same runs on a processor.
+r"""Errors of localizers trained on a GPU, or on a processor.
 
-    python -m benchmarks.gpu_errors results/night/frames/large_room \
-        --labels results/night/labels/large_room/6k/synfeal --devices cuda cpu --out errors.csv
+    python -m benchmarks.gpu_errors OUT/frames-small --labels OUT/labels --device cuda --out o.csv
+    python -m benchmarks.gpu_errors OUT/frames-large --labels OUT/labels --device cuda \
+        --models posenet posenet2 poselstm --seeds 0 --width 1 --batch 45 --seconds 60 --out o.csv
 
-Every seed is trained on every device as ``synfeal train`` trains, and predicts the same test
-frames. Networks have the side of the packed frames.
+with the directory that :mod:`benchmarks.gpu_frames` fills, or with packed frames and labels of a
+profile. Runs are trained as ``synfeal train`` trains, and predict the same test frames. Networks
+have the side of the packed frames.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import argparse
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,7 +34,7 @@ from baselines.localizers.registry import backbone_of
 from baselines.training.checkpoint import frame_camera
 from baselines.training.fit import FOR_PHOTOGRAPHS
 from baselines.training.predict import write_predictions
-from baselines.training.run import Job, train_localizer
+from baselines.training.run import Job, step_seconds, train_localizer
 from baselines.training.train import ROTATIONS, recipe_of
 from synfeal.dataset.packed import read_packed
 from synfeal.errors import exit_status
@@ -55,40 +57,39 @@ class ErrorRow(NamedTuple):
     seconds: float
 
 
-def error_of(
-    frames: Path, labels: Path, model: str, device: str, seed: int, options: argparse.Namespace
-) -> ErrorRow:
+class Budget(NamedTuple):
+    """Length of a run.
+
+    Attributes:
+        images: Images shown.
+        seconds: In their place, seconds to train for: as many images as a short trial says.
+    """
+
+    images: int
+    seconds: float | None = None
+
+
+def error_of(frames: Path, labels: Path, job: Job, budget: Budget) -> ErrorRow:
     """Train one localizer, and compare its predictions with the labels of the test frames.
 
     Args:
         frames: Directory of ``train.npy`` and ``test.npy``.
         labels: Directory of ``train.csv`` and ``test.csv``.
-        model: Name of the localizer.
-        device: Device to train on.
-        seed: Seed of the run.
-        options: Width, batch and length, as :func:`build_parser` reads them.
+        job: The run, but for its length.
+        budget: Its length.
     """
-    side = read_packed(frames / "train.npy").shape[1]
-    network = NetworkConfig(input_px=side, width=options.width, view="whole")
-    known = frame_camera(frames / "train.npy") is not None
-    training = TrainingConfig(
-        samples_seen={},
-        batch_size=options.batch,
-        augmentation=ROTATIONS if known else AugmentationConfig(),
-        device=device,
-    )
-    job = Job(model, network, recipe_of(model), training, options.images, seed, FOR_PHOTOGRAPHS)
-    shipped = options.width == SHIPPED_WIDTH
-    weights = shipped_weights_path(backbone_of(model, network)) if shipped else None
+    shipped = job.network.width == SHIPPED_WIDTH
+    weights = shipped_weights_path(backbone_of(job.name, job.network)) if shipped else None
+    files = frames / "train.npy", labels / "train.csv"
+    images = budget.images
+    if budget.seconds is not None:
+        steps = budget.seconds / step_seconds(job, *files, weights)
+        images = max(1, round(steps)) * job.training.batch_size
+    job = job._replace(samples_seen=images)
     with tempfile.TemporaryDirectory() as folder:
         out, began = Path(folder), time.perf_counter()
         trained = train_localizer(
-            job,
-            frames / "train.npy",
-            labels / "train.csv",
-            out / "model.pt",
-            out / "history.csv",
-            weights=weights,
+            job, *files, out / "model.pt", out / "history.csv", weights=weights
         )
         seconds = time.perf_counter() - began
         poses = write_predictions(
@@ -97,17 +98,35 @@ def error_of(
     shift_m = poses.predicted.position_m - poses.given.position_m
     angle_rad = rotation_angle_rad(poses.predicted.quat_wxyz, poses.given.quat_wxyz)
     return ErrorRow(
-        localizer=model,
-        input_px=side,
-        width=options.width,
-        batch=options.batch,
-        images=options.images,
-        device=device,
-        seed=seed,
+        localizer=job.name,
+        input_px=job.network.input_px,
+        width=job.network.width,
+        batch=job.training.batch_size,
+        images=images,
+        device=job.training.device,
+        seed=job.seed,
         position_m=float(np.median(np.linalg.norm(shift_m, axis=1))),
         orientation_deg=float(np.degrees(np.median(angle_rad))),
         seconds=seconds,
     )
+
+
+def jobs_of(options: argparse.Namespace) -> Iterator[Job]:
+    """List the runs that options ask for; how many images they show is left open."""
+    packed = options.frames / "train.npy"
+    side = read_packed(packed).shape[1]
+    known = frame_camera(packed) is not None
+    training = TrainingConfig(
+        samples_seen={},
+        batch_size=options.batch,
+        augmentation=ROTATIONS if known else AugmentationConfig(),
+        device=options.device,
+    )
+    network = NetworkConfig(input_px=side, width=options.width, view="whole")
+    for model in options.models:
+        for seed in options.seeds:
+            recipe = recipe_of(model)
+            yield Job(model, network, recipe, training, 0, seed, FOR_PHOTOGRAPHS)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -116,9 +135,11 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("frames", type=Path, help="directory of train.npy and test.npy")
     parser.add_argument("--labels", type=Path, required=True, help="of train.csv and test.csv")
     parser.add_argument("--models", nargs="+", default=["posenet2"], choices=MODELS)
-    parser.add_argument("--devices", nargs="+", default=["cuda", "cpu"], choices=("cuda", "cpu"))
-    parser.add_argument("--seeds", type=int, default=3, help="runs of each (3)")
-    parser.add_argument("--images", type=int, default=30_000, help="images shown (30000)")
+    parser.add_argument("--device", default="cuda", choices=("cuda", "cpu"))
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], help="a run each")
+    length = parser.add_mutually_exclusive_group()
+    length.add_argument("--images", type=int, default=30_000, help="images shown (30000)")
+    length.add_argument("--seconds", type=float, help="instead, seconds to train each run for")
     parser.add_argument("--width", type=float, default=SHIPPED_WIDTH, help="(0.25)")
     parser.add_argument("--batch", type=int, default=64, help="(64)")
     parser.add_argument("--out", type=Path, required=True, help="CSV to write")
@@ -128,12 +149,11 @@ def build_parser() -> argparse.ArgumentParser:
 def run(options: argparse.Namespace) -> None:
     """Train, print, and write the table after every run."""
     rows = []
-    for model in options.models:
-        for device in options.devices:
-            for seed in range(options.seeds):
-                rows.append(error_of(options.frames, options.labels, model, device, seed, options))
-                write_frame(options.out, pd.DataFrame(rows), "%.5g")
-                print(rows[-1], flush=True)
+    for job in jobs_of(options):
+        budget = Budget(options.images, options.seconds)
+        rows.append(error_of(options.frames, options.labels, job, budget))
+        write_frame(options.out, pd.DataFrame(rows), "%.5g")
+        print(rows[-1], flush=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -72,10 +72,27 @@ def gpu_text(files: Files, path: Path) -> str:
     rows.append(_hours("all", files, rates))
     table = [["", "runs", "images", "one GPU"]]
     table += [[row.name, f"{row.runs:,}", number(row.images), row.time] for row in rows]
-    cards = ", ".join(sorted(set(rates["card"]))) or "no card"
-    text = f"Training on one GPU, one run after the other, by {path} ({cards})\n\n"
-    return f"{text}{text_table(table)}\n" + "".join(
-        f"missing     {line}\n" for line in _missing(files, rates, rows[-1])
+    missing = [f"missing     {line}\n" for line in _missing(files, rates, rows[-1])]
+    title = f"Training on one GPU, one run after the other, by {path}"
+    return f"{title}\n\n{text_table(table)}\n{_rates_text(files, rates)}{''.join(missing)}"
+
+
+def _rates_text(files: Files, rates: pd.DataFrame) -> str:
+    """List the rates that the hours rest on; nothing where none is known."""
+    if rates.empty:
+        return ""
+    shape = _shape_text(files)
+    table = [["rates", "images/s", "step", "card"]]
+    for name, rate in rates.iterrows():
+        table.append([str(name), number(rate["images_per_s"]), rate["step"], rate["card"]])
+    return f"{text_table(table)}            of {shape}\n\n"
+
+
+def _shape_text(files: Files) -> str:
+    network, training = files.config.network, files.config.training
+    randomised = ", randomised" if training.randomisation is not None else ""
+    return (
+        f"{network.input_px} px, width {network.width:g}, batch {training.batch_size}{randomised}"
     )
 
 
@@ -113,10 +130,9 @@ def _missing(files: Files, rates: pd.DataFrame, total: TableHours) -> list[str]:
         rate = number(total.images / WEEKEND_S)
         lines.append(f"{rate} images/s over all runs, to be done in a weekend (60 h)")
     if total.unknown:
-        shape = f"{files.config.network.input_px} px, width {files.config.network.width:g}"
         lines.append(
-            f"rates of {number(total.unknown)} images ({shape}, batch"
-            f" {files.config.training.batch_size}): measure them by {MEASURING}"
+            f"rates of {number(total.unknown)} images ({_shape_text(files)}):"
+            f" measure them by {MEASURING}"
         )
     plain = rates.index[rates["step"] == "plain"]
     if len(plain):

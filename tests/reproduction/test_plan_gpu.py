@@ -36,8 +36,26 @@ def test_hours_are_images_by_rate(paper, tmp_path):
     text = gpu_text(paper, rates(tmp_path / "rates.csv", rate=per_hour / 3600))
     assert row_of(text, "all").endswith(" 10.0 h")
     assert "card X" in text
-    assert "captured" not in text  # nothing is missing there
+    assert "missing" not in text.replace("missing     rendering", "")
     assert "weekend" not in text
+
+
+def test_the_rates_that_hours_rest_on_are_printed(paper, tmp_path):
+    told = "".join(
+        f"{name},224,1,45,captured,False,1,{1000 + place},card {place}\n"
+        for place, name in enumerate(MODELS)
+    )
+    (tmp_path / "rates.csv").write_text(HEADER + told)
+    text = gpu_text(paper, tmp_path / "rates.csv")
+    for place, name in enumerate(MODELS):
+        assert row_of(text, name).split() == [
+            name,
+            f"{1000 + place:,}",
+            "captured",
+            "card",
+            str(place),
+        ]
+    assert "of 224 px, width 1, batch 45" in text
 
 
 def test_what_was_not_measured_is_said(paper, tmp_path):
@@ -64,7 +82,7 @@ def test_rates_that_cannot_be_read_are_told(paper, tmp_path):
 
 
 def test_the_tracked_rates_tell_every_table_of_the_paper(capsys):
-    assert main(["plan", "--profile", "paper", "--gpu"]) == 0
+    assert main(["cost", "--profile", "paper", "--gpu"]) == 0
     said = capsys.readouterr().out
     for table in ("table2_ground_truth", "table4_size", "all"):
         assert not row_of(said, table).endswith("unknown")
@@ -73,5 +91,5 @@ def test_the_tracked_rates_tell_every_table_of_the_paper(capsys):
 
 
 def test_options_of_processors_are_refused_beside_a_gpu(capsys):
-    assert main(["plan", "--gpu", "--cores", "4"]) == 1
+    assert main(["cost", "--gpu", "--cores", "4"]) == 1
     assert "--cores: is of a plan on processors" in capsys.readouterr().err

@@ -51,7 +51,8 @@ def dry_run(profile, results, out):
             said = record.__dict__
             if said.get("event") == LogEvent.JOB_INFO:
                 kept = {name: said[name] for name in ("benchmark", "input", "output")}
-                records.append({"rule": said["rule_name"], **kept})
+                asked = said["resources"].get("gpu_percent", 0)
+                records.append({"rule": said["rule_name"], "gpu_percent": asked, **kept})
 
     with SnakemakeApi(OutputSettings(dryrun=True)) as api:
         workflow = api.workflow(

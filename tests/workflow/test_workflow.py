@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -58,26 +59,53 @@ def test_the_complete_profile_adds_our_own_tables(tmp_path):
     assert jobs["side_table"] == 10
 
 
+@pytest.fixture(scope="module")
+def smoke_jobs(tmp_path_factory):
+    """Records of all jobs of the smoke profile, on a machine with a GPU of 20 GiB."""
+    folder = tmp_path_factory.mktemp("smoke")
+    told = folder / "nvidia-smi"
+    told.write_text("#!/bin/sh\necho 20480\n")
+    told.chmod(0o755)
+    out = folder / "jobs.json"
+    command = ["tests.support.dry_run", "config/smoke.yaml", str(folder), str(out)]
+    subprocess.run(
+        [sys.executable, "-m", *command],
+        cwd=ROOT,
+        env=os.environ | {"PATH": f"{folder}:{os.environ['PATH']}"},
+        check=True,
+        capture_output=True,
+    )
+    return json.loads(out.read_text())
+
+
 def test_the_record_of_a_run_reads_what_every_job_took_and_all_asks_every_job_for_an_output(
-    tmp_path,
+    smoke_jobs,
 ):
     """Else the record depends on which jobs happen to have ended, and on a shared file system."""
-    out = tmp_path / "jobs.json"
-    command = ["tests.support.dry_run", "config/smoke.yaml", str(tmp_path), str(out)]
-    subprocess.run([sys.executable, "-m", *command], cwd=ROOT, check=True, capture_output=True)
-    jobs = json.loads(out.read_text())
-    (read,) = (set(job["input"]) for job in jobs if job["rule"] == "provenance")
-    unread = {job["rule"] for job in jobs if job["benchmark"] and job["benchmark"] not in read}
+    (read,) = (set(job["input"]) for job in smoke_jobs if job["rule"] == "provenance")
+    unread = {
+        job["rule"] for job in smoke_jobs if job["benchmark"] and job["benchmark"] not in read
+    }
     assert unread == {"provenance", "report"}  # made beside the record
     # An output of a job that failed is missed only where a target asks for it.
-    (asked,) = (set(job["input"]) for job in jobs if job["rule"] == "all")
-    unasked = {job["rule"] for job in jobs if job["output"] and asked.isdisjoint(job["output"])}
+    (asked,) = (set(job["input"]) for job in smoke_jobs if job["rule"] == "all")
+    unasked = {
+        job["rule"] for job in smoke_jobs if job["output"] and asked.isdisjoint(job["output"])
+    }
     assert unasked == {
         "render_packed",
         "render_varied",
         "features",
         "views",
     }  # gone once they are used
+
+
+def test_jobs_that_train_and_draw_share_the_card_of_this_machine(smoke_jobs):
+    asked = {job["rule"]: job["gpu_percent"] for job in smoke_jobs if job["gpu_percent"]}
+    assert asked == {
+        **dict.fromkeys(("train", "train_varied"), 25),  # four at a time
+        **dict.fromkeys(("render", "render_packed", "render_varied"), 7),  # fourteen
+    }
 
 
 def test_a_single_experiment_is_a_target(tmp_path):

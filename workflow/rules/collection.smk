@@ -138,6 +138,7 @@ rule render:
         "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
+        gpu_percent=rendering_percent(DRAWING_CARD_MB),
     params:
         camera=lambda w: dump(getattr(CONFIG, f"{w.camera}_camera")),
         start=lambda w: FILES.sequence(w.scene, w.camera, w.sequence).start,
@@ -263,6 +264,7 @@ rule render_packed:
         "../envs/synfeal.yaml"
     resources:
         mem_mb=grown(3000),
+        gpu_percent=rendering_percent(DRAWING_CARD_MB),
     params:
         camera=dump(CONFIG.network_camera),
         start=lambda w: FILES.sequence(w.scene, "network", w.sequence).start,

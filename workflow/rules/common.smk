@@ -10,6 +10,7 @@ from baselines.labels.methods import METHODS, frame_methods, graph_methods, trut
 from baselines.localizers.registry import backbone_of
 from baselines.references.registry import in_group
 from baselines.training.memory import training_mb
+from baselines.training.sharing import card_mb, rendering_percent, training_percent
 from reproduction.config.load import check_mesh_files, check_results, parse_config
 from reproduction.design.experiments import (
     INJECTED,
@@ -106,6 +107,13 @@ def file_of(files):
 def grown(mem_mb):
     """Memory of a job in MB: as much again with every attempt that a profile's ``retries`` allows."""
     return lambda wildcards, attempt: attempt * mem_mb
+
+
+# Jobs of a machine with a GPU ask for shares of it, in percent; `--resources gpu_percent=100`, as in
+# profiles/default, lets as many run at a time as one card bears. Elsewhere they ask for none.
+CARD_MB = card_mb()
+TRAINING_CARD_MB = None if CONFIG.training.device == "cpu" else CARD_MB
+DRAWING_CARD_MB = CARD_MB if CONFIG.render.backend in ("auto", "opengl") else None
 
 
 def made_by(*names):

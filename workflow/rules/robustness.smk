@@ -66,6 +66,12 @@ rule train_varied:
             CONFIG.network,
             CONFIG.training.batch_size,
         ),
+        gpu_percent=lambda w: training_percent(
+            FILES.n_of_size(ROBUST_SCENE, CONFIG.robustness.size),
+            CONFIG.network,
+            CONFIG.training.batch_size,
+            TRAINING_CARD_MB,
+        ),
     params:
         run=lambda w: training_parameters(CONFIG, FILES.robust_run(w.model)),
     script:

@@ -24,6 +24,12 @@ rule pretrain:
                 CONFIG.pretraining.batch_size,
             )
         ),
+        gpu_percent=training_percent(
+            CONFIG.pretraining.frames * len(CONFIG.rooms),
+            CONFIG.network,
+            CONFIG.pretraining.batch_size,
+            TRAINING_CARD_MB,
+        ),
     params:
         pretraining=dump(CONFIG.pretraining),
         network=dump(CONFIG.network),
@@ -66,6 +72,12 @@ rule train:
             FILES.n_of_size(w.scene, w.size),
             CONFIG.network,
             CONFIG.training.batch_size,
+        ),
+        gpu_percent=lambda w: training_percent(
+            FILES.n_of_size(w.scene, w.size),
+            CONFIG.network,
+            CONFIG.training.batch_size,
+            TRAINING_CARD_MB,
         ),
     params:
         run=lambda w: training_parameters(CONFIG, Run(**w)),
