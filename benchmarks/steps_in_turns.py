@@ -26,7 +26,7 @@ from synfeal.records.provenance import git_commit
 from synfeal.records.tables import write_frame
 
 ROOT = Path(__file__).resolve().parents[1]
-LOCALIZERS: tuple[ModelName, ...] = ("posenet", "posenet2", "posenet2resnet")
+LOCALIZERS: tuple[ModelName, ...] = ("posenet", "hourglass", "posenet2resnet", "posenet2")
 INPUT_PX, WIDTH, BATCH, FRAMES = 64, 0.25, 64, 128
 
 
