@@ -22,6 +22,7 @@ from contextlib import ExitStack, contextmanager
 from itertools import takewhile
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Literal
 
 import pandas as pd
 
@@ -33,10 +34,11 @@ from synfeal.records.tables import write_frame
 PROCESSES = multiprocessing.get_context("forkserver")
 PROCESSES.set_forkserver_preload(["benchmarks.gpu_steps"])
 Answer = tuple[Rate, Machine]
+Device = Literal["auto", "cpu", "cuda"]
 
 
 def measure(
-    cases: Sequence[Case], device: str, seconds: float, most_seconds: float = 220.0
+    cases: Sequence[Case], device: Device, seconds: float, most_seconds: float = 220.0
 ) -> Iterator[tuple[Case, Rate, Machine]]:
     """Measure cases in processes of their own; yields those that were not lost.
 
@@ -70,7 +72,9 @@ def measure(
                 return
 
 
-def _answers(batch: Sequence[Case], device: str, seconds: float, until: float) -> Iterator[Answer]:
+def _answers(
+    batch: Sequence[Case], device: Device, seconds: float, until: float
+) -> Iterator[Answer]:
     """Measure cases one after the other, in as many processes as they ask for, until one is lost.
 
     Args:
@@ -103,7 +107,7 @@ def _together(answers: Sequence[Answer]) -> Answer:
 
 
 @contextmanager
-def _worker(cases: Sequence[Case], device: str, seconds: float) -> Iterator[Connection]:
+def _worker(cases: Sequence[Case], device: Device, seconds: float) -> Iterator[Connection]:
     """Start a process that measures cases, and end it after the block."""
     answers, sender = PROCESSES.Pipe(duplex=False)
     process = PROCESSES.Process(target=_work, args=(cases, device, seconds, sender), daemon=True)
@@ -117,7 +121,7 @@ def _worker(cases: Sequence[Case], device: str, seconds: float) -> Iterator[Conn
         answers.close()
 
 
-def _work(cases: Sequence[Case], device: str, seconds: float, sender: Connection) -> None:
+def _work(cases: Sequence[Case], device: Device, seconds: float, sender: Connection) -> None:
     """Measure cases, in a process of its own."""
     from baselines.training.device import open_device
     from benchmarks.gpu_steps import machine_of, rate_of

@@ -99,8 +99,8 @@ def work(steps: int) -> None:
     )
     network = NetworkConfig(input_px=INPUT_PX, width=WIDTH, view="whole")
     for line in sys.stdin:
-        hyper = recipe_of(line.strip())  # type: ignore[arg-type]
-        localizer = build_localizer(line.strip(), network, hyper)  # type: ignore[arg-type]
+        hyper = recipe_of(line.strip())
+        localizer = build_localizer(line.strip(), network, hyper)
         localizer.place_on(device)
         schedule = Schedule(
             samples_seen=steps * BATCH,
