@@ -14,6 +14,7 @@ from types import FrameType
 from typing import Any
 
 LONGEST = 900  # characters of a message
+BROKEN_PIPE = 141  # exit status, as of a program that SIGPIPE ends
 
 # What parsers say of their own insides, which helps nobody with a file.
 INSIDES = re.compile(
@@ -88,6 +89,10 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except OSError as error:
+        if isinstance(error, BrokenPipeError) and error.filename is None:
+            # Whoever read what is printed has read enough, as ``head`` does.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return BROKEN_PIPE
         if error.strerror is None:  # of no system call: a defect
             raise
         place = f"{error.filename}: " if error.filename else ""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
@@ -26,9 +28,21 @@ Described = dict[str, tuple[Vectors, Vectors]]
 
 
 def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write arrays as an uncompressed ``.npz``."""
+    """Write arrays as an uncompressed ``.npz``.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     with atomic_path(path) as temporary:
-        np.savez(temporary, allow_pickle=False, **arrays)
+        try:
+            np.savez(temporary, allow_pickle=False, **arrays)
+        except (OSError, ValueError) as error:
+            # On a full disk NumPy names no reason, and zipfile then fails to end the member.
+            cause = error if isinstance(error, OSError) else error.__context__
+            if not isinstance(cause, OSError):
+                raise
+            number = cause.errno or errno.ENOSPC
+            raise OSError(number, os.strerror(number), str(path)) from error
 
 
 def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:

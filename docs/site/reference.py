@@ -15,7 +15,7 @@ from types import ModuleType
 
 import baselines
 import synfeal
-from synfeal.cli import all_commands, build_parser
+from synfeal.cli.parser import all_commands, build_parser
 
 Pages = dict[str, str]  # text by path below the reference
 

@@ -11,8 +11,12 @@ ROS. The twist of the odometry is not known: it is 0, and so are all covariances
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
+import sqlite3
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +37,7 @@ FRAMES_PER_S = 30
 FIRST_NS = 10**9
 WORLD, CAMERA = "world", "camera_color_optical_frame"
 COLOR, DEPTH = "/camera/color", "/camera/depth"
+SQLITE_DISK = {sqlite3.SQLITE_FULL: errno.ENOSPC, sqlite3.SQLITE_IOERR: errno.EIO}
 Messages = Iterator[tuple[str, Any]]  # topic and message
 
 
@@ -64,7 +69,7 @@ def _write_bag(
 ) -> None:
     from rosbags.rosbag2 import Writer
 
-    with Writer(path, version=9) as writer:
+    with _disk_errors(path), Writer(path, version=9) as writer:
         connections: dict[str, Any] = {}
         for frame in frames:
             time_ns = FIRST_NS + frame.frame.number * 10**9 // FRAMES_PER_S
@@ -75,6 +80,19 @@ def _write_bag(
                 content = store.serialize_cdr(message, kind)
                 writer.write(connections[topic], time_ns, content)
             place(frame.color, None)
+
+
+@contextmanager
+def _disk_errors(path: Path) -> Iterator[None]:
+    """Raise what SQLite says of a full disk, or of one that fails, as ``OSError``."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        code = getattr(error, "sqlite_errorcode", None)
+        if code is None or code & 0xFF not in SQLITE_DISK:
+            raise
+        number = SQLITE_DISK[code & 0xFF]
+        raise OSError(number, os.strerror(number), str(path)) from error
 
 
 def _messages(data: ExportSet, store: Typestore, frame: ExportFrame, time_ns: int) -> Messages:

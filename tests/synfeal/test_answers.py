@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import synfeal
-from synfeal.cli import all_commands
+from synfeal.cli.parser import all_commands
 from synfeal.cli.wording import Wording
 from synfeal.config.flags import flag_of
 from synfeal.errors import Argument, InputError

@@ -8,8 +8,9 @@ import pytest
 
 import synfeal
 from synfeal.api import CollectOptions, ViewOptions
-from synfeal.cli import all_commands, main
+from synfeal.cli import main
 from synfeal.cli.options import destination
+from synfeal.cli.parser import all_commands
 from synfeal.config.collect import CollectConfig, LikeConfig, ViewConfig
 from synfeal.config.flags import as_options, flag_of
 from synfeal.errors import InputError

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from synfeal.cli import main
 from tests.support.collected import refused
 from tests.support.damaged_sets import frame_files
+from tests.support.small_disk import mounted
 
 TOPICS = {
     "/camera/color/image_raw": "sensor_msgs/msg/Image",
@@ -130,3 +131,10 @@ def test_without_the_package_one_line_says_what_to_install(planar, tmp_path, cap
     line = refused(capsys, "export", planar, "--to", "rosbag", "--out", tmp_path / "out")
     assert "pip install 'synfeal[ros]'" in line
     assert not (tmp_path / "out").exists()
+
+
+def test_a_full_disk_is_one_line(planar, tmp_path, capfd):
+    with mounted(tmp_path / "disk", "64k") as disk:
+        line = refused(capfd, "export", planar, "--to", "rosbag", "--out", disk / "out")
+        assert "No space left on device" in line
+        assert list(disk.iterdir()) == []
