@@ -11,6 +11,7 @@ from baselines.config.learning import MODELS
 from synfeal.cli.options import command, keywords, option
 
 if TYPE_CHECKING:
+    from baselines.training.checkpoint import UnseenScore
     from baselines.training.localize import Localized
     from baselines.training.train import TrainedModel
 
@@ -83,7 +84,7 @@ LOCALIZE_OPTIONS = (
     ),
     option(
         "--held-out",
-        "share of the paths that is held out to measure the error (0.1)",
+        "share of the paths that is held out to measure the error, one after the other (0.1)",
         type=float,
         default=0.1,
         metavar="SHARE",
@@ -130,21 +131,52 @@ def train(arguments: argparse.Namespace) -> None:
         done = learn(**keywords(arguments, train))
     except KeyboardInterrupt as interrupt:
         raise KeyboardInterrupt("run the same command again to go on") from interrupt
+    warn_of_ignorance(done.unseen)
     print(trained_text(done))
     print(f"synfeal localize {done.model} photos/ --out poses.csv")
 
 
 def trained_text(done: TrainedModel) -> str:
-    """Summarise in a line what was trained and its error on held-out paths."""
+    """Summarise in a line what was trained and its errors, those on the test split first."""
     before = "had ended before: " if done.finished_before else ""
     learned = (
         f"{before}{done.images} images shown of {done.n_frames} frames on {done.n_paths} paths"
     )
-    if done.errors is None:
-        return f"{done.model}: {learned}; nothing was held out, so its error is not known"
-    position, orientation = done.errors.position_m, done.errors.orientation_deg
-    error = f"median error on held-out paths {position:.3f} m / {orientation:.1f} degrees"
-    return f"{done.model}: {learned}; {error}"
+    found = []
+    if done.unseen is not None and done.unseen.frames == "test split":
+        found.append(unseen_text(done.unseen))
+    if done.errors is not None:
+        errors = _errors_text(done.errors.position_m, done.errors.orientation_deg)
+        found.append(f"{errors} on held-out places")
+    known = ", ".join(found)
+    said = f"median error {known}" if known else "nothing was held out, so its error is not known"
+    return f"{done.model}: {learned}; {said}"
+
+
+def warn_of_ignorance(unseen: UnseenScore | None) -> None:
+    """Say where a model is lost outside of the places that it has learned from."""
+    if unseen is None or unseen.knows_place:
+        return
+    log.warning(
+        "the model does not know places that it has not been shown: always answering the middle of"
+        " the training positions has a median error of %.2f m there, the model %s; collect frames"
+        ' of more places (`mode="random"`, more `frames`), or train longer (`images`)',
+        unseen.constant_m,
+        "none" if unseen.position_m is None else f"{unseen.position_m:.2f} m",
+    )
+
+
+def unseen_text(unseen: UnseenScore) -> str:
+    """Summarise the errors where a localizer has not been."""
+    errors = _errors_text(unseen.position_m, unseen.orientation_deg)
+    frames = "test frames" if unseen.frames == "test split" else "held-out frames"
+    return f"{errors} on {unseen.n_frames} {frames}"
+
+
+def _errors_text(position_m: float | None, orientation_deg: float | None) -> str:
+    if position_m is None or orientation_deg is None:
+        return "not finite"
+    return f"{position_m:.3f} m / {orientation_deg:.1f} degrees"
 
 
 def report_localized(arguments: argparse.Namespace, done: Localized) -> None:
@@ -160,6 +192,7 @@ def report_localized(arguments: argparse.Namespace, done: Localized) -> None:
             done.n_images,
         )
     warn_of_unlike(arguments.model, done)
+    warn_of_ignorance(done.description.unseen)
     print(f"{arguments.model}: {model_text(done)}")
     if done.n_resampled:
         print(f"{arguments.model}: {resampled_text(done)}")
@@ -203,7 +236,9 @@ def model_text(done: Localized) -> str:
         across, down = camera.fov_deg
         view = f"they must see {across:.1f} x {down:.1f} degrees, as the training frames do"
     lens = ", through the same distorting lens" if camera and any(camera.distortion) else ""
-    return f"{description.localizer}, pictures shrunk to {px} x {px} pixels; {view}{lens}"
+    unseen = description.unseen
+    error = "" if unseen is None else f"; its median error was {unseen_text(unseen)}"
+    return f"{description.localizer}, pictures shrunk to {px} x {px} pixels; {view}{lens}{error}"
 
 
 # Of photographs and the file of --camera, which is of the sensor.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import torch
 from pydantic import Field, SerializeAsAny, ValidationError, ValidationInfo, field_validator
@@ -62,10 +62,29 @@ Row = tuple[Finite, Finite, Finite, Finite]
 Point = tuple[Finite, Finite, Finite]
 
 
+# Share of the error of a constant answer that a localizer's may be where it has not been.
+TELLING = 0.5
+
+
+class UnseenScore(Strict):
+    """Median errors of a localizer on frames of places that it has not learned from."""
+
+    frames: Literal["test split", "held out"] = Field(description="which frames those are")
+    n_frames: Count = Field(description="number of them")
+    position_m: Finite | None = Field(description="position error; none where most have no pose")
+    orientation_deg: Finite | None = Field(description="orientation error, likewise")
+    constant_m: Finite = Field(description="position error of always answering the training mean")
+
+    @property
+    def knows_place(self) -> bool:
+        """Check whether the localizer does clearly better than always answering the same."""
+        return self.position_m is not None and self.position_m <= TELLING * self.constant_m
+
+
 class ModelDescription(Strict):
     """Description of a trained localizer, stored beside its weights."""
 
-    unless_none = ("sequence_from_world", "bounds_m", "rotations", "scene")
+    unless_none = ("sequence_from_world", "bounds_m", "rotations", "scene", "unseen")
 
     localizer: ModelName = Field(description="name of the localizer")
     network: NetworkConfig = Field(description="shape it was built with")
@@ -83,6 +102,9 @@ class ModelDescription(Strict):
         None, description="that training images were turned by, where they were"
     )
     scene: str | None = Field(None, description="name of the place it was trained in")
+    unseen: UnseenScore | None = Field(
+        None, description="its errors where it has not been, if they were measured"
+    )
 
     @field_validator("hyper", mode="before")
     @classmethod

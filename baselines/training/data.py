@@ -233,6 +233,30 @@ def held_out_paths(path: NDArray[np.int64], share: float, seed: int) -> NDArray[
         Whether each frame (N,) is held out.
     """
     paths = np.unique(path)
-    count = min(max(round(share * len(paths)), 1), len(paths) - 1) if share > 0 else 0
-    drawn = generator_of("held-out paths", seed).permutation(paths)[:count]
+    drawn = generator_of("held-out paths", seed).permutation(paths)[: _n_held_out(paths, share)]
     return np.isin(path, drawn)
+
+
+def held_out_stretch(path: NDArray[np.int64], share: float, seed: int) -> NDArray[np.bool_]:
+    """Mark the frames of paths that follow each other, to hold out of training.
+
+    A planned path begins where the one before it ended, and photographs are taken in order: a path
+    drawn alone lies between two that are learned. The frames of a stretch are about as far from all
+    others as those of an independent test split are.
+
+    Args:
+        path: Path (N,) of each frame, numbered in the order of the way.
+        share: Share of the paths to hold out; see :func:`held_out_paths`.
+        seed: Seed of the draw.
+
+    Returns:
+        Whether each frame (N,) is held out.
+    """
+    paths = np.unique(path)
+    count = _n_held_out(paths, share)
+    first = generator_of("held-out stretch", seed).integers(len(paths) - count + 1)
+    return np.isin(path, paths[first : first + count])
+
+
+def _n_held_out(paths: NDArray[np.int64], share: float) -> int:
+    return min(max(round(share * len(paths)), 1), len(paths) - 1) if share > 0 else 0

@@ -165,11 +165,14 @@ class Familiarity(NamedTuple):
         outside_m: Distance (N,) of positions to the box of the training positions; ``nan`` where
             the model does not say which that is.
         beyond: Positions (N,) that are farther outside of that box than it is wide.
+        knows_place: Whether the model was right about places that it had not been shown; None where
+            that was not measured.
     """
 
     typicality: Array
     outside_m: Array
     beyond: NDArray[np.bool_]
+    knows_place: bool | None = None
 
     @property
     def unlike(self) -> NDArray[np.bool_]:
@@ -177,8 +180,13 @@ class Familiarity(NamedTuple):
         return np.asarray(self.typicality <= OUTSIDE)
 
     def status(self, good: NDArray[np.bool_]) -> NDArray[np.object_]:
-        """Fill the column ``status`` (N,) in words; ``good`` (N,) are finite poses."""
-        told = [~good, self.unlike | self.beyond, np.isfinite(self.typicality)]
+        """Fill the column ``status`` (N,) in words; ``good`` (N,) are finite poses.
+
+        A model that is lost in parts of its own place says ``inside`` of nothing: it takes pictures
+        of those for what it knows.
+        """
+        told_apart = np.isfinite(self.typicality) & (self.knows_place is not False)
+        told = [~good, self.unlike | self.beyond, told_apart]
         words = np.select(told, ["no pose", "outside", "inside"], default="unknown")
         return words.astype(object)
 
@@ -195,13 +203,15 @@ def _seen(trained: TrainedLocalizer, position_m: Array, features: Tensor | None)
     typical = unknown
     if calibration is not None and features is not None:
         typical = typicality(calibration, features).round(DECIMALS)
+    score = trained.description.unseen
+    knows_place = None if score is None else score.knows_place
     if trained.description.bounds_m is None:
-        return Familiarity(typical, unknown, np.zeros(len(position_m), bool))
+        return Familiarity(typical, unknown, np.zeros(len(position_m), bool), knows_place)
     low, high = np.array(trained.description.bounds_m)
     excess_m = np.maximum(np.maximum(low - position_m, position_m - high), 0.0)
     beyond = excess_m > np.maximum(high - low, LEAST_MARGIN_M)
     outside_m = np.linalg.norm(excess_m, axis=1).round(DECIMALS)
-    return Familiarity(typical, outside_m, np.asarray(beyond.any(axis=1)))
+    return Familiarity(typical, outside_m, np.asarray(beyond.any(axis=1)), knows_place)
 
 
 def _moved(sequence_from_world: Array, position_m: Array, quat_wxyz: Array) -> tuple[Array, Array]:

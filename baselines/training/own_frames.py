@@ -1,13 +1,15 @@
 """Frames of a person's own data sets, packed for training.
 
-A data set is one that ``synfeal collect`` wrote, of which the training split is taken, or a
-sequence of photographs with poses (see :mod:`synfeal.dataset.posed_sequence`). Several are joined:
+A data set is one that ``synfeal collect`` wrote, of which the training split is learned from and
+the test split scored, or a sequence of photographs with poses (see
+:mod:`synfeal.dataset.posed_sequence`). Several are joined:
 all poses are taken to the world of the first, and photographs of a known camera to that of the
 rendered frames.
 """
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import os
 from collections.abc import Iterator, Sequence
@@ -41,9 +43,9 @@ from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.packed import fit_frame, new_packed
 from synfeal.dataset.pose_table import PoseTable, read_pose_table, write_pose_table
 from synfeal.dataset.posed_sequence import PosedFrames, is_tum, read_posed_sequence
-from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
+from synfeal.dataset.sevenscenes import SPLIT_FILES, Split, read_split
 from synfeal.dataset.world import read_sequence_from_world
-from synfeal.errors import Argument, InputError
+from synfeal.errors import Argument, InputError, read_as
 from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.records.files import file_sha256, read_json, write_json
 from synfeal.records.progress import Progress
@@ -105,6 +107,30 @@ class OwnFrames:
     def __len__(self) -> int:
         return len(self.color)
 
+    def sha256(self) -> str:
+        """Hash of all that is learned from them: images, poses, paths, camera and world."""
+        total = hashlib.sha256()
+        with ThreadPoolExecutor(READERS) as readers:
+            for image in readers.map(_sha256, self.color):
+                total.update(image)
+        for values in (self.world_from_cam, self.path, self.sequence_from_world):
+            total.update(b"" if values is None else values.tobytes())
+        total.update(repr((self.camera, self.wide)).encode())
+        return total.hexdigest()
+
+    def spread(self, most: int) -> OwnFrames:
+        """Take at most so many of the frames, evenly spread."""
+        if len(self) <= most:
+            return self
+        chosen = np.linspace(0, len(self) - 1, most).round().astype(int)
+        return replace(
+            self,
+            color=tuple(self.color[i] for i in chosen),
+            depth=tuple(self.depth[i] for i in chosen),
+            world_from_cam=self.world_from_cam[chosen],
+            path=self.path[chosen],
+        )
+
 
 @dataclass(frozen=True)
 class PackedFrames:
@@ -125,27 +151,50 @@ class PackedFrames:
     n_paths: int
 
 
-def read_own_frames(folder: Path, ranges: Sequence[FrameRange]) -> OwnFrames:
-    """Find the training frames of a data set; images are not opened.
+def _sha256(file: FrameFile) -> bytes:
+    with read_as(file, "an image", OSError):
+        return hashlib.sha256(file.read_bytes()).digest()
+
+
+def read_test_frames(folder: Path) -> OwnFrames | None:
+    """Find the test frames of a data set; None where it has none.
+
+    Raises:
+        InputError: A file is missing or damaged.
+    """
+    if not (folder / SPLIT_FILES["test"]).is_file():
+        return None
+    sequences = read_split(folder, "test")
+    missing = [path for path in sequences if not path.exists()]
+    if missing:
+        log.warning("%s: is not there, so the test split is not scored", missing[0])
+    return read_own_frames(folder, (), "test") if sequences and not missing else None
+
+
+def read_own_frames(
+    folder: Path, ranges: Sequence[FrameRange], split: Split = "train"
+) -> OwnFrames:
+    """Find the frames of a data set; images are not opened.
 
     Args:
         folder: Data set of ``synfeal collect``, or a sequence of photographs.
         ranges: Frames to take of photographs; none: all.
+        split: Split to take, where there are splits.
 
     Raises:
         InputError: There are no such frames, or a file is missing or damaged.
     """
-    split = os.path.lexists(folder / SPLIT_FILES["train"])
+    has_split = os.path.lexists(folder / SPLIT_FILES[split])
     rendered = os.path.lexists(folder / MANIFEST)
-    if split:
-        sequences = [read_posed_sequence(path) for path in read_split(folder, "train")]
+    if has_split:
+        sequences = [read_posed_sequence(path) for path in read_split(folder, split)]
         if not sequences:
             raise InputError(
-                folder / SPLIT_FILES["train"], "names no sequence", "collect training frames"
+                folder / SPLIT_FILES[split], "names no sequence", "collect training frames"
             )
-    if rendered and split:
-        parts, path = sequences, _paths_of_table(folder, sum(map(len, sequences)))
-    elif split:
+    if rendered and has_split:
+        parts, path = sequences, _paths_of_table(folder, sum(map(len, sequences)), split)
+    elif has_split:
         parts = [part for whole in sequences for part in _ranges_of(folder, whole, ranges)]
         path = None
     else:
@@ -161,7 +210,7 @@ def read_own_frames(folder: Path, ranges: Sequence[FrameRange]) -> OwnFrames:
         path=_blocks(parts) if path is None else path,
         camera=None if camera is None or wide else _frame_camera(camera),
         wide=wide,
-        is_rendered=rendered and split,
+        is_rendered=rendered and has_split,
         sequence_from_world=read_sequence_from_world(folder),
         scene=_scene_of(folder),
     )
@@ -220,9 +269,9 @@ def _ranges_of(
         yield part
 
 
-def _paths_of_table(folder: Path, n_frames: int) -> NDArray[np.int64] | None:
-    """Read the path of each frame from ``train.csv``; None where there is none."""
-    table = folder / "train.csv"
+def _paths_of_table(folder: Path, n_frames: int, split: Split) -> NDArray[np.int64] | None:
+    """Read the path of each frame from the table of a split; None where there is none."""
+    table = folder / f"{split}.csv"
     if not table.is_file():
         return None
     path = read_pose_table(table).path
@@ -284,8 +333,49 @@ def pack_own_frames(
     Raises:
         InputError: An image cannot be used, or the data sets do not fit together.
     """
-    target = _target_camera(sets, photographs)
-    frames, labels = out / "frames.npy", out / "labels.csv"
+    made = PackedFrames(
+        frames=out / "frames.npy",
+        labels=out / "labels.csv",
+        sequence_from_world=sets[0].sequence_from_world,
+        camera=_target_camera(sets, photographs),
+        n_paths=sum(len(np.unique(own.path)) for own in sets),
+    )
+    _pack(made, sets, photographs, network)
+    return made
+
+
+def pack_test_frames(
+    sets: Sequence[OwnFrames],
+    photographs: PhotographCamera,
+    network: NetworkConfig,
+    out: Path,
+    learned: PackedFrames,
+) -> PackedFrames:
+    """Write ``test_frames.npy`` and ``test_labels.csv`` as the frames learned from are packed.
+
+    Args:
+        sets: Test frames of data sets.
+        photographs: Camera of those that do not name one.
+        network: Side of the packed images, and what of a frame they show.
+        out: Directory to write to.
+        learned: Training frames, whose camera and world these are brought to.
+
+    Raises:
+        InputError: An image cannot be used.
+    """
+    frames, labels = out / "test_frames.npy", out / "test_labels.csv"
+    made = replace(learned, frames=frames, labels=labels)
+    _pack(made, sets, photographs, network)
+    return made
+
+
+def _pack(
+    made: PackedFrames,
+    sets: Sequence[OwnFrames],
+    photographs: PhotographCamera,
+    network: NetworkConfig,
+) -> None:
+    """Write the files of packed frames."""
     jobs = [(own, file) for own in sets for file in own.color]
     resamplers: dict[Calibration, Resampler | None] = {}
 
@@ -294,7 +384,7 @@ def pack_own_frames(
         image, turn = read_image(file, "RGB"), Orientation.UPRIGHT
         if own.camera is None and own.wide is None:
             photograph = image, turn = upright(image)
-            image = _resampled(photograph, file, photographs, target, resamplers)
+            image = _resampled(photograph, file, photographs, made.camera, resamplers)
         elif own.camera is not None and image.size != (own.camera.width, own.camera.height):
             raise InputError(
                 file,
@@ -306,7 +396,7 @@ def pack_own_frames(
 
     turns: list[Orientation] = []
     with (
-        new_packed(frames, len(jobs), network.input_px) as packed,
+        new_packed(made.frames, len(jobs), network.input_px) as packed,
         Progress(len(jobs), "pack") as progress,
         ThreadPoolExecutor(READERS) as readers,
     ):
@@ -317,15 +407,8 @@ def pack_own_frames(
                 progress.update()
         finally:
             readers.shutdown(cancel_futures=True)
-    write_pose_table(labels, _joined(_turned_upright(sets, turns)))
-    _write_record(frames, target)
-    return PackedFrames(
-        frames=frames,
-        labels=labels,
-        sequence_from_world=_common_world(sets),
-        camera=target,
-        n_paths=sum(len(np.unique(own.path)) for own in sets),
-    )
+    write_pose_table(made.labels, _joined(_turned_upright(sets, turns), made.sequence_from_world))
+    _write_record(made.frames, made.camera)
 
 
 def _target_camera(sets: Sequence[OwnFrames], photographs: PhotographCamera) -> FrameCamera | None:
@@ -397,21 +480,18 @@ def _resampled(
     return image if resampler is None else resampler(image)
 
 
-def _common_world(sets: Sequence[OwnFrames]) -> Array | None:
-    """Return ``sequence_from_world`` of the first data set, whose world the labels are in."""
-    return sets[0].sequence_from_world
-
-
-def _joined(sets: Sequence[OwnFrames]) -> PoseTable:
-    """Join all frames in the world of the first data set, numbering their paths consecutively.
+def _joined(sets: Sequence[OwnFrames], sequence_from_common: Array | None) -> PoseTable:
+    """Join all frames in one world, numbering their paths consecutively.
 
     Photographs are in the world of their sequence, rendered frames in that of the mesh.
+
+    Args:
+        sets: Frames.
+        sequence_from_common: Motion (4, 4) from the common world to that of the sequence.
     """
-    common = _motion(sets[0])
     poses, paths, first = [], [], 0
     for own in sets:
-        common_from_own = np.linalg.inv(common) @ _motion(own)
-        poses.append(own.world_from_cam if own is sets[0] else common_from_own @ own.world_from_cam)
+        poses.append(_in_world(own, sequence_from_common))
         known, index = np.unique(own.path, return_inverse=True)
         paths.append(first + index)
         first += len(known)
@@ -424,8 +504,19 @@ def _joined(sets: Sequence[OwnFrames]) -> PoseTable:
     )
 
 
-def _motion(own: OwnFrames) -> Array:
-    return np.eye(4) if own.sequence_from_world is None else own.sequence_from_world
+def _in_world(own: OwnFrames, sequence_from_common: Array | None) -> Array:
+    """Return the poses (N, 4, 4) of a data set in another world than its own, or in that."""
+    if _same_motion(own.sequence_from_world, sequence_from_common):
+        return own.world_from_cam  # to the last bit
+    sequence_from_own, common = (
+        np.eye(4) if motion is None else motion
+        for motion in (own.sequence_from_world, sequence_from_common)
+    )
+    return np.asarray(np.linalg.inv(common) @ sequence_from_own @ own.world_from_cam)
+
+
+def _same_motion(one: Array | None, other: Array | None) -> bool:
+    return one is other or (one is not None and other is not None and np.array_equal(one, other))
 
 
 def _write_record(frames: Path, camera: FrameCamera | None) -> None:

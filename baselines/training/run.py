@@ -33,6 +33,7 @@ from baselines.training.data import (
     ImageStatistics,
     LabelledFrames,
     held_out_paths,
+    held_out_stretch,
     image_statistics,
     read_labelled_frames,
 )
@@ -318,9 +319,10 @@ def _split(
             raise ValueError("this protocol chooses weights by the test set, which is not given")
         frames, labels = test
         return data, read_labelled_frames(frames, labels, data.images.shape[-1], data.images.device)
-    aside = job.protocol.selection in ("validation", "averaged")
-    share = job.training.validation_share if aside else 0.0
-    mask = held_out_paths(data.path, share, job.seed)
+    if job.protocol.selection == "last":
+        return data, None
+    hold_out = held_out_stretch if job.protocol.selection == "averaged" else held_out_paths
+    mask = hold_out(data.path, job.training.validation_share, job.seed)
     return (data.part(~mask), data.part(mask)) if mask.any() else (data, None)
 
 

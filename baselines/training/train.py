@@ -23,9 +23,11 @@ from baselines.config.learning import (
 )
 from baselines.localizers.backbones.shipped import shipped_weights_path
 from baselines.localizers.registry import backbone_of
+from baselines.training.checkpoint import UnseenScore, save_checkpoint
 from baselines.training.data import MOST_READ_BYTES
 from baselines.training.device import open_device
 from baselines.training.fit import FOR_PHOTOGRAPHS
+from baselines.training.localize import DEFAULT_TURNS
 from baselines.training.memory import free_mb, training_mb
 from baselines.training.own_frames import (
     FrameRange,
@@ -33,14 +35,18 @@ from baselines.training.own_frames import (
     PackedFrames,
     check_posed_depth,
     pack_own_frames,
+    pack_test_frames,
     read_own_frames,
+    read_test_frames,
 )
 from baselines.training.run import Job, step_seconds, train_localizer
 from baselines.training.selection import HeldOutErrors, kept_errors
+from baselines.training.unseen import MOST_TEST_FRAMES, score_held_out, score_test_split
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.config.photometric import PhotometricConfig
 from synfeal.errors import Argument, InputError, wording
 from synfeal.records.files import read_json, refuse_foreign, refuse_inside, write_json, writing_to
+from synfeal.records.lock import only_command
 from synfeal.records.provenance import provenance
 
 log = logging.getLogger(__name__)
@@ -67,8 +73,11 @@ DEFAULT_IMAGES = 30_000
 MOST_IMAGES = 10**9  # weeks, on any machine
 
 MODEL, HISTORY, RECORD = "model.pt", "history.csv", "training.json"
+LOCK = ".lock"
 # What lies there while a run is under way, and what a kill may leave.
-TEMPORARY = ("frames.npy", "frames.json", "labels.csv", "resume.pt", "budget.json")
+PACKED = ("frames.npy", "frames.json", "labels.csv")
+TEST_PACKED = tuple(f"test_{name}" for name in PACKED)
+TEMPORARY = (*PACKED, *TEST_PACKED, "resume.pt", "budget.json", LOCK)
 
 
 def recipe_of(localizer: ModelName) -> LocalizerConfig:
@@ -88,7 +97,8 @@ class TrainJob:
         minutes: Approximate length of the training, minutes.
         ranges: Frames to take of photographs; none: all.
         photographs: Camera of photographs.
-        held_out: Share of the paths that are not learned from and tell the error.
+        held_out: Share of the paths that are not learned from and tell the error, a stretch of
+            paths that follow each other.
         randomisation: Ranges of light, lens and sensor; None to show images as they are.
         rotations: Rotations of images; they need a known camera without distortion.
         input_px: Side of the network's image; None: 64 on a processor, 224 on a GPU.
@@ -126,7 +136,9 @@ class TrainedModel(NamedTuple):
         images: Images shown.
         n_frames: Frames of all data sets.
         n_paths: Paths they are of.
-        errors: On the frames of held-out paths; None where nothing was held out.
+        errors: On the held-out frames; None where nothing was held out.
+        unseen: On the test split, answered as ``localize`` answers; on the held-out frames where
+            there is no such split; None where there is neither.
         finished_before: The same run had ended before, so nothing was done.
     """
 
@@ -135,7 +147,32 @@ class TrainedModel(NamedTuple):
     n_frames: int
     n_paths: int
     errors: HeldOutErrors | None
+    unseen: UnseenScore | None = None
     finished_before: bool = False
+
+
+class Sets(NamedTuple):
+    """Frames of the data sets of a training run.
+
+    Attributes:
+        learned: Frames to learn from, of each data set.
+        test: Test frames, of those that have any.
+    """
+
+    learned: list[OwnFrames]
+    test: list[OwnFrames]
+
+    @classmethod
+    def read(cls, job: TrainJob) -> Sets:
+        """Find the frames of all data sets; images are not opened."""
+        learned = [read_own_frames(folder, job.ranges) for folder in job.datasets]
+        found = [read_test_frames(folder) for folder in job.datasets]
+        most = MOST_TEST_FRAMES // len(job.datasets)
+        return cls(learned, [own.spread(most) for own in found if own is not None])
+
+    def sha256(self) -> dict[str, list[str]]:
+        """Hash the frames, in the order of the data sets."""
+        return {name: [own.sha256() for own in part] for name, part in self._asdict().items()}
 
 
 def train(job: TrainJob) -> TrainedModel:
@@ -152,19 +189,23 @@ def train(job: TrainJob) -> TrainedModel:
     device = open_device(job.device)
     network = _network(job, device)
     settings = _settings(job, network)
+    sets = Sets.read(job)
+    hashes = sets.sha256()
     if (job.out / RECORD).exists():
-        return _finished(job, settings)
-    sets = [read_own_frames(folder, job.ranges) for folder in job.datasets]
-    _refuse_useless(job, sets)
-    for own in sets:
+        return _finished(job, settings, hashes)
+    _refuse_useless(job, sets.learned)
+    for own in sets.learned:
         check_posed_depth(own, job.photographs)
     is_new = not job.out.exists()
-    job.out.mkdir(parents=True, exist_ok=True)
     try:
         with writing_to(job.out, lambda: "run the same command again when that is mended"):
-            packed = pack_own_frames(sets, job.photographs, network, job.out)
-            run = _job_of(job, network, packed)
-            return _trained(job, run, sets, packed, settings)
+            job.out.mkdir(parents=True, exist_ok=True)
+            with only_command(job.out, job.out / LOCK):
+                if (job.out / RECORD).exists():  # by a command that has just ended
+                    return _finished(job, settings, hashes)
+                packed = pack_own_frames(sets.learned, job.photographs, network, job.out)
+                run = _job_of(job, network, packed)
+                return _trained(job, run, sets, packed, {"settings": settings, "sha256": hashes})
     except InputError:
         if is_new and not any(job.out.iterdir()):
             job.out.rmdir()
@@ -174,11 +215,19 @@ def train(job: TrainJob) -> TrainedModel:
 def _trained(
     job: TrainJob,
     run: Job,
-    sets: Sequence[OwnFrames],
+    sets: Sets,
     packed: PackedFrames,
-    settings: dict[str, Any],
+    known_by: dict[str, Any],
 ) -> TrainedModel:
-    """Train, write the record last, and remove what was needed on the way."""
+    """Train, score the test split, write the record last, remove what was needed on the way.
+
+    Args:
+        job: The call.
+        run: The run that it comes to.
+        sets: Frames of its data sets.
+        packed: Those to learn from, packed.
+        known_by: Entries of the record that tell this run from others.
+    """
     began = time.monotonic()
     trained = train_localizer(
         run,
@@ -188,27 +237,43 @@ def _trained(
         job.out / HISTORY,
         weights=_start_of(job, run),
         sequence_from_world=packed.sequence_from_world,
-        scene=" + ".join(dict.fromkeys(own.scene for own in sets)),
+        scene=" + ".join(dict.fromkeys(own.scene for own in sets.learned)),
         calibrated=True,
     )
-    errors = kept_errors(trained.rows)
-    n_frames = sum(map(len, sets))
+    localizer = trained.localizer
+    errors, unseen = kept_errors(trained.rows), None
+    if sets.test:
+        network = localizer.description.network
+        test = pack_test_frames(sets.test, job.photographs, network, job.out, packed)
+        unseen = score_test_split(localizer, packed, test, DEFAULT_TURNS)
+    elif errors is not None:
+        unseen = score_held_out(errors, packed, job.held_out, job.seed)
+    described = localizer.description.model_copy(update={"unseen": unseen})
+    save_checkpoint(
+        job.out / MODEL,
+        localizer.network,
+        localizer.statistics,
+        described,
+        localizer.calibration,
+    )
+    n_frames = sum(map(len, sets.learned))
     origin = provenance(job.seed, "")
     write_json(
         job.out / RECORD,
         {
-            "settings": settings,
+            **known_by,
             "images": run.samples_seen,
-            "frames": {str(own.folder): len(own) for own in sets},
+            "frames": {str(own.folder): len(own) for own in sets.learned},
             "paths": packed.n_paths,
             "held_out": None if errors is None else errors._asdict(),
+            "unseen": None if unseen is None else unseen.model_dump(),
             "seconds": round(time.monotonic() - began, 1),
             **{key: origin[key] for key in ("commit", "packages", "platform")},
         },
     )
-    for name in TEMPORARY:
+    for name in set(TEMPORARY) - {LOCK}:
         (job.out / name).unlink(missing_ok=True)
-    return TrainedModel(job.out / MODEL, run.samples_seen, n_frames, packed.n_paths, errors)
+    return TrainedModel(job.out / MODEL, run.samples_seen, n_frames, packed.n_paths, errors, unseen)
 
 
 def _check(job: TrainJob) -> None:
@@ -319,24 +384,46 @@ def _settings(job: TrainJob, network: NetworkConfig) -> dict[str, Any]:
     }
 
 
-def _finished(job: TrainJob, settings: dict[str, Any]) -> TrainedModel:
+def _finished(
+    job: TrainJob, settings: dict[str, Any], hashes: dict[str, list[str]]
+) -> TrainedModel:
     """Return the run that ended here, or refuse one that was trained otherwise."""
-    path = job.out / RECORD
-    record = read_json(path)
-    before = SETTINGS_BEFORE | record["settings"]
-    differing = [key for key in settings if before.get(key) != settings[key]]
-    if differing or not (job.out / MODEL).is_file():
-        what = f"with another {differing[0]}" if differing else "and its model.pt is gone"
-        raise InputError(
-            job.out,
-            f"holds a localizer trained {what}",
-            "delete it or choose another directory with `out`",
-        )
+    record = read_json(job.out / RECORD)
+    if problem := _not_this_run(job, record, settings, hashes):
+        remedy = "delete it or choose another directory with `out`"
+        raise InputError(job.out, f"holds a localizer trained {problem}", remedy)
     errors = None if record["held_out"] is None else HeldOutErrors(**record["held_out"])
-    n_frames = sum(record["frames"].values())
+    unseen = record.get("unseen") if record.get("sha256") == hashes else None
     return TrainedModel(
-        job.out / MODEL, record["images"], n_frames, record["paths"], errors, finished_before=True
+        model=job.out / MODEL,
+        images=record["images"],
+        n_frames=sum(record["frames"].values()),
+        n_paths=record["paths"],
+        errors=errors,
+        unseen=None if unseen is None else UnseenScore.model_validate(unseen),
+        finished_before=True,
     )
+
+
+def _not_this_run(
+    job: TrainJob, record: dict[str, Any], settings: dict[str, Any], hashes: dict[str, list[str]]
+) -> str | None:
+    """Say in what a run that has ended differs from the one that is asked for, if it does."""
+    before = SETTINGS_BEFORE | record["settings"]
+    learned = record.get("sha256", {}).get("learned")
+    if learned == hashes["learned"]:  # data sets are known by their content, wherever they lie
+        before["datasets"] = settings["datasets"]
+    differing = [key for key in settings if before.get(key) != settings[key]]
+    if differing:
+        return f"with another {differing[0]}"
+    if learned is not None and learned != hashes["learned"]:
+        changed = [
+            str(folder)
+            for folder, old, new in zip(job.datasets, learned, hashes["learned"], strict=False)
+            if old != new
+        ]
+        return f"on other frames, {', '.join(changed)} has changed since"
+    return None if (job.out / MODEL).is_file() else "and its model.pt is gone"
 
 
 def _job_of(job: TrainJob, network: NetworkConfig, packed: PackedFrames) -> Job:

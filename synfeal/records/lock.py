@@ -49,11 +49,19 @@ def begin_run(root: Path) -> None:
 
 @contextmanager
 def only_command(directory: Path, lock: Path) -> Iterator[None]:
-    """Keep other commands out of ``directory`` during the block, by a lock on the file ``lock``."""
+    """Keep other commands out of ``directory`` during the block, by a lock on the file ``lock``.
+
+    The file is there during the block alone.
+
+    Raises:
+        InputError: Another command holds the lock.
+        OSError: The file cannot be created.
+    """
     held = _lock(lock, directory)
     try:
         yield
     finally:
+        lock.unlink(missing_ok=True)  # while it is held: nobody else can have taken it
         held.release()
 
 

@@ -23,9 +23,11 @@ from synfeal.dataset.packed import fit_frame
 from synfeal.dataset.pose_table import read_pose_table
 from synfeal.dataset.sevenscenes import pose_text
 from synfeal.dataset.world import write_sequence_from_world
+from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.records.files import unfinished_prefix
+from synfeal.records.lock import only_command
 from tests.support.collected import refused
 
 ROOT = Path(__file__).parents[2]
@@ -112,13 +114,87 @@ def test_a_run_that_has_ended_is_not_made_again(photographs, undisturbed, tmp_pa
     assert again.errors.position_m == record["held_out"]["position_m"]
 
 
+def test_a_data_set_is_known_by_its_content(photographs, undisturbed, tmp_path):
+    out = Path(shutil.copytree(undisturbed, tmp_path / "out"))
+    moved = Path(shutil.copytree(photographs, tmp_path / "moved"))
+    assert run(out, moved).finished_before
+    # Collected anew under the same name: one image differs, then one pose.
+    record = json.loads((out / "training.json").read_text())
+    record["settings"]["datasets"] = [str(moved)]
+    (out / "training.json").write_text(json.dumps(record))
+    image, pose = moved / "frame-000003.color.jpg", moved / "frame-000003.pose.txt"
+    before = image.read_bytes()
+    image.write_bytes((moved / "frame-000004.color.jpg").read_bytes())
+    with pytest.raises(InputError, match=rf"trained on other frames, {moved} has changed since"):
+        run(out, moved)
+    image.write_bytes(before)
+    pose.write_text(pose.read_text().replace("1.0000000000e+00", "1.0000000001e+00", 1))
+    with pytest.raises(InputError, match="on other frames"):
+        run(out, moved)
+
+
+def test_a_record_without_hashes_is_of_the_data_set_it_names(photographs, undisturbed, tmp_path):
+    out = Path(shutil.copytree(undisturbed, tmp_path / "out"))
+    record = json.loads((out / "training.json").read_text())
+    del record["sha256"], record["unseen"]  # as earlier versions wrote it
+    (out / "training.json").write_text(json.dumps(record))
+    assert run(out, photographs).finished_before
+    moved = Path(shutil.copytree(photographs, tmp_path / "moved"))
+    with pytest.raises(InputError, match="with another datasets"):
+        run(out, moved)
+
+
+def test_one_run_at_a_time_in_a_directory(photographs, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    with (
+        only_command(out, out / ".lock"),
+        pytest.raises(InputError, match="another run is at work there"),
+    ):
+        run(out, photographs)
+    assert list(out.iterdir()) == []
+
+
+def test_the_test_split_is_scored_as_localize_answers_it(tmp_path, capsys):
+    folder = tmp_path / "set"
+    write_photographs(folder / "seq-01")
+    write_photographs(folder / "seq-02", count=5, seed=1)
+    (folder / "TrainSplit.txt").write_text("sequence1\n")
+    (folder / "TestSplit.txt").write_text("sequence2\n")
+    camera = PhotographCamera(focal_px=70.0)
+    done = run(tmp_path / "out", folder, images=64, photographs=camera)
+    poses = tmp_path / "poses.csv"
+    given = ["localize", done.model, folder / "seq-02", "--focal", 70, "--out", poses]
+    assert main([str(argument) for argument in [*given, "--device", "cpu"]]) == 0
+    answered = np.loadtxt(poses, delimiter=",", skiprows=1, usecols=(1, 2, 3))
+    true = np.array([[0.02 * index, 0.5, 1.0] for index in range(5)])
+    expected = np.median(np.linalg.norm(answered - true, axis=1))
+    assert done.unseen.n_frames == 5
+    assert done.unseen.position_m == pytest.approx(expected, abs=1e-5)
+    capsys.readouterr()
+    given = ["train", folder, "--out", tmp_path / "out", "--images", 64, "--device", "cpu"]
+    assert main([str(argument) for argument in [*given, "--focal", 70]]) == 0
+    said = capsys.readouterr().out
+    assert f"; median error {expected:.3f} m / " in said
+    assert said.index(" on 5 test frames, ") < said.index(" on held-out places")
+
+
+def test_a_test_split_that_is_not_there_is_said(tmp_path, caplog):
+    folder = tmp_path / "set"
+    write_photographs(folder / "seq-01")
+    (folder / "TrainSplit.txt").write_text("sequence1\n")
+    (folder / "TestSplit.txt").write_text("sequence2\n")
+    assert run(tmp_path / "out", folder, images=64).unseen.frames == "held out"
+    assert "seq-02: is not there, so the test split is not scored" in caplog.text
+
+
 def test_what_is_said_leads_to_localize_and_evaluate(photographs, tmp_path, capsys, caplog):
     out, poses = tmp_path / "trained", tmp_path / "poses.csv"
     given = ["train", photographs, "--out", out, "--images", 320, "--device", "cpu", "--focal", 70]
     assert main([str(argument) for argument in given]) == 0
     said, line = capsys.readouterr().out.strip().splitlines()
     assert "320 images shown of 20 frames on 10 paths" in said
-    assert "median error on held-out paths" in said
+    assert re.search(r"; median error [\d.]+ m / [\d.]+ degrees on held-out places$", said)
     progress = r"320 of 320 samples, loss -?[\d.]+, held out [\d.]+ m/[\d.]+°.* 0 s left"
     assert re.search(progress, caplog.text)
     assert line.split()[:3] == ["synfeal", "localize", str(out / "model.pt")]

@@ -11,7 +11,7 @@ from baselines.labels.injected import add_noise
 from baselines.localizers.losses import PosePrediction
 from baselines.localizers.registry import build_localizer
 from baselines.training import selection
-from baselines.training.data import BatchOrder, held_out_paths
+from baselines.training.data import BatchOrder, held_out_paths, held_out_stretch
 from baselines.training.fit import PROTOCOLS, fit
 from baselines.training.optimizer import Schedule, optimisation_of
 from baselines.training.selection import HeldOutErrors, Selection, held_out_errors
@@ -212,6 +212,19 @@ class Recorder(Jitter):
     def __call__(self, images, quat_wxyz):
         self.shown.append(images.sum(dim=(1, 2, 3)))
         return super().__call__(images, quat_wxyz)
+
+
+@pytest.mark.parametrize(("n_paths", "share", "count"), [(20, 0.1, 2), (10, 0.5, 5), (3, 0.9, 2)])
+def test_a_stretch_is_of_paths_that_follow_each_other(n_paths, share, count):
+    path = np.repeat(np.arange(n_paths), 4)
+    firsts = set()
+    for seed in range(12):
+        held = np.unique(path[held_out_stretch(path, share, seed)])
+        np.testing.assert_array_equal(held, held[0] + np.arange(count))
+        firsts.add(int(held[0]))
+    assert len(firsts) > 1  # the seed decides which
+    assert not held_out_stretch(path, 0.0, 0).any()
+    assert not held_out_stretch(np.zeros(5, int), 0.5, 0).any()  # never all
 
 
 @pytest.mark.parametrize(("share", "left"), [(0.0, 60), (0.3, 40)])
