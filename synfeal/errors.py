@@ -227,7 +227,7 @@ def why(error: BaseException) -> str:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
         said = f"{key}: {wording(first)}" if key else wording(first)
-    said = OBJECT.sub("", str(said).strip().partition("\n")[0])
+    said = OBJECT.sub("", str(said)[:LONGEST].strip().partition("\n")[0])
     said = TOKEN.sub(r"\1", NO_NUMBER.sub(r"\2 is no number", said))
     if said.startswith("but "):  # the second half of a sentence of YAML's
         said = f"{getattr(error, 'context', '')}, {said}"

@@ -21,7 +21,7 @@ import yaml
 
 from synfeal.camera.programs import as_opencv
 from synfeal.errors import InputError, why
-from synfeal.records.files import PlainLoader
+from synfeal.records.files import MOST_TEXT_BYTES, MOST_YAML_BYTES, PlainLoader, read_text
 
 # Names under which the same thing is found; the first is the one that messages give.
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx")
@@ -168,7 +168,8 @@ def _read(path: Path) -> Calibration:
     try:
         if suffix not in (".yaml", ".yml", ".json", ".txt"):
             raise ValueError(BINARY if suffix == ".bin" else UNKNOWN)
-        text = path.read_text(encoding="utf-8")
+        is_yaml = suffix in (".yaml", ".yml")
+        text = read_text(path, most_bytes=MOST_YAML_BYTES if is_yaml else MOST_TEXT_BYTES)
         if suffix == ".txt":
             return _from_colmap(text)
         if suffix == ".json":

@@ -22,6 +22,7 @@ from synfeal.captures.images import depth_reader, read_photograph
 from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import interpolate, inverse, pose_matrix
+from synfeal.records.files import read_text
 
 MILLIMETRES = 1000.0
 COLOR, DEPTH, CONFIDENCE = "lowres_wide", "lowres_depth", "confidence"
@@ -81,7 +82,7 @@ def _read(path: Path) -> Capture:
 def _trajectory(path: Path) -> tuple[Array, Array]:
     """Read times (N,) in seconds and ``world_from_cam`` (N, 4, 4)."""
     with read_as(path, "a trajectory"):
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = read_text(path).splitlines()
     rows = [
         numbers(line, 7, f"{path}: line {number}")
         for number, line in enumerate(lines, 1)
@@ -120,7 +121,7 @@ def _frame(
     time_s: float,
 ) -> CapturedFrame:
     with read_as(pincam, "a calibration"):
-        text = pincam.read_text(encoding="utf-8")
+        text = read_text(pincam)
     width, height, *pinhole = numbers(text, 6, pincam).tolist()
     camera = calibration(int(width), int(height), pinhole, pincam)
     return CapturedFrame(

@@ -21,6 +21,7 @@ from synfeal.dataset.depth import MILLIMETRES
 from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import inverse
+from synfeal.records.files import read_text
 
 
 def _is_at(path: Path) -> bool:
@@ -29,7 +30,7 @@ def _is_at(path: Path) -> bool:
 
 def _matrix(path: Path) -> Array:
     with read_as(path, "a matrix"):
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     return numbers(text, 16, path).reshape(4, 4)
 
 
@@ -82,7 +83,7 @@ def _read(path: Path) -> Capture:
 def _pose(path: Path) -> Array | None:
     """Read a pose (4, 4); None where it is not finite: tracking was lost."""
     with read_as(path, "a pose"):
-        values = np.array(path.read_text(encoding="utf-8").split(), np.float64)
+        values = np.array(read_text(path).split(), np.float64)
     if values.shape == (16,) and not np.isfinite(values).all():
         return None
     if values.shape != (16,):

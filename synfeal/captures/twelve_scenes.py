@@ -13,6 +13,7 @@ from synfeal.captures.formats import CaptureFormat
 from synfeal.captures.images import depth_reader, read_photograph
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.errors import InputError, read_as
+from synfeal.records.files import read_text
 
 INFO = "info.txt"
 ENTRY = re.compile(r"^\s*(m_\w+)\s*=\s*(.*?)\s*$", re.MULTILINE)
@@ -33,7 +34,7 @@ def _frames_of(path: Path) -> Path:
 def _read(path: Path) -> Capture:
     info = _info_of(path)
     with read_as(info, "the calibrations of a scene"):
-        entries = dict(ENTRY.findall(info.read_text(encoding="utf-8")))
+        entries = dict(ENTRY.findall(read_text(info)))
     color, depth = _camera(info, entries, "Color"), _camera(info, entries, "Depth")
     units_per_m = numbers(_entry(info, entries, "m_depthShift"), 1, f"{info}: m_depthShift")[0]
     moved = numbers(_entry(info, entries, "m_calibrationColorExtrinsic"), 16, info).reshape(4, 4)

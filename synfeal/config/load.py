@@ -12,13 +12,14 @@ import yaml
 from pydantic import ValidationError
 
 from synfeal.errors import InputError, read_as, wording
-from synfeal.records.files import PlainLoader
+from synfeal.records.files import MOST_YAML_BYTES, PlainLoader, read_text
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
     """Read a YAML mapping from a file."""
     with read_as(path, "YAML", OSError, ValueError, RecursionError, yaml.YAMLError):
-        value = yaml.load(path.read_text(encoding="utf-8"), PlainLoader)  # noqa: S506 (a SafeLoader)
+        text = read_text(path, most_bytes=MOST_YAML_BYTES)
+        value = yaml.load(text, PlainLoader)  # noqa: S506 (a SafeLoader)
     if not isinstance(value, dict):
         found = "nothing" if value is None else _shortened(reprlib.repr(value))
         raise InputError(path, f"must hold a mapping of keys, found {found}")

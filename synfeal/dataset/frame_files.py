@@ -72,8 +72,11 @@ class ArchivedFile:
         """As a path has it: ``.png``."""
         return PurePath(self.name).suffix
 
-    def read_bytes(self) -> bytes:
+    def read_bytes(self, most_bytes: int = MOST_BYTES) -> bytes:
         """Read the member and verify its checksum.
+
+        Args:
+            most_bytes: Members that unpack to more are not read.
 
         Raises:
             OSError: it is missing (``FileNotFoundError``), or the archive is damaged.
@@ -84,8 +87,8 @@ class ArchivedFile:
                 info = opened.getinfo(member)
             except KeyError as error:
                 raise FileNotFoundError(f"{self}: missing") from error
-            if info.file_size > MOST_BYTES:
-                raise OSError(f"{self}: {info.file_size} bytes are too many for a frame")
+            if info.file_size > most_bytes:
+                raise OSError(f"{info.file_size} bytes are too many for such a file")
             return opened.read(info)
 
     def read_text(self, encoding: str = "utf-8") -> str:

@@ -22,6 +22,7 @@ from PIL import Image
 from synfeal.camera.orientation import Orientation, orientation_of
 from synfeal.dataset.frame_files import MOST_PIXELS, FrameFile, decode_png
 from synfeal.errors import InputError, read_as
+from synfeal.records.files import read_bytes
 
 # Modes of Pillow that hold colours of eight bits per channel, or fewer.
 EIGHT_BIT = ("1", "L", "LA", "La", "P", "PA", "RGB", "RGBA", "RGBX", "RGBa", "CMYK", "YCbCr", "LAB")
@@ -42,6 +43,7 @@ HEIF_SUFFIXES = (".heic", ".heif")
 HEIF_BRANDS = (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1")
 HEIF = "HEIF"
 HEIF_REMEDY = "pip install 'synfeal[heic]', or convert to JPEG"
+MOST_FILE_BYTES = 2**30  # of an image; more than its pixels take, stored plainly
 # A frame of nearly one colour: every so many rows and columns are looked at, and so many of their
 # pixels are within so many grey levels of the median.
 LOOKED_AT, SAME, ONE_COLOR = 4, 2, 0.95
@@ -203,9 +205,11 @@ def _opened(path: FrameFile) -> IO[bytes]:
 
 
 def _content(path: FrameFile, remedy: str = "") -> bytes:
-    with read_as(path, "an image", OSError, remedy=remedy):
+    with read_as(path, "an image", OSError, ValueError, remedy=remedy):
         try:
-            return path.read_bytes()
+            return (
+                read_bytes(path, MOST_FILE_BYTES) if isinstance(path, Path) else path.read_bytes()
+            )
         except FileNotFoundError as error:
             raise InputError(path, f"missing{remedy}") from error
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from synfeal.dataset.pose_list import Convention, PoseList
 from synfeal.errors import InputError, read_as
+from synfeal.records.files import read_text
 from synfeal.records.tables import is_number
 
 Array = NDArray[np.float64]
@@ -84,7 +85,7 @@ def image_lines(path: Path) -> list[tuple[str, NamedPose]]:
         InputError: The file cannot be read, or holds a line that is neither.
     """
     with read_as(path, "a COLMAP model"):
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = read_text(path, "utf-8-sig").splitlines()
     found = []
     is_points = False  # whether the second line of an image is due
     for number, line in enumerate(lines, start=1):
@@ -188,7 +189,7 @@ def read_kapture(path: Path) -> PoseList:
 
 def _kapture_rows(path: Path, n_cells: int) -> Iterator[tuple[int, list[str]]]:
     with read_as(path, "a kapture table"):
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = read_text(path, "utf-8-sig").splitlines()
     for number, line in enumerate(lines, start=1):
         if not line.strip() or line.startswith("#"):
             continue

@@ -31,11 +31,11 @@ from synfeal.dataset.frame_files import (
     sequence_names,
 )
 from synfeal.dataset.poses_in import read_trajectory
-from synfeal.dataset.sevenscenes import read_pose
+from synfeal.dataset.sevenscenes import pose_file_text, read_pose
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import interpolate
 from synfeal.geometry.rigid import refuse_non_rigid
-from synfeal.records.files import lies_in
+from synfeal.records.files import lies_in, read_text
 
 COLOR_SUFFIXES = ("png", "jpg", "jpeg")
 FRAME = re.compile(r"frame-(\d+)\.(color\.(?:png|jpg|jpeg)|depth\.png|pose\.txt)")
@@ -227,7 +227,7 @@ def _read_frames(entries: Sequence[_Entry]) -> PosedFrames:
 def _pose(path: FrameFile) -> Array | None:
     """Read a rigid pose (4, 4); None where it is not finite."""
     with read_as(path, "a pose"):
-        cells = path.read_text(encoding="utf-8").split()
+        cells = pose_file_text(path).split()
         values = np.array(cells, np.float64)
     if len(values) == 16 and not np.isfinite(values).all():
         return None
@@ -254,7 +254,7 @@ def _read_tum(path: Path) -> PosedFrames:
     depth: list[FrameFile | None] = [None] * len(color)
     if (path / DEPTH_LIST).is_file():
         depth_s, files = _read_list(path, DEPTH_LIST)
-        nearest = np.abs(depth_s[None, :] - color_s[:, None]).argmin(axis=1)
+        nearest = _nearest(depth_s, color_s)
         keep &= np.abs(depth_s[nearest] - color_s) <= DEPTH_SLACK_S
         depth = [files[index] for index in nearest]
     trajectory = read_trajectory(path / TRAJECTORY).by_time(path / TRAJECTORY)
@@ -282,8 +282,8 @@ def _read_tum(path: Path) -> PosedFrames:
             len(color),
         )
     fraction = (color_s - pose_s[after - 1]) / (pose_s[after] - pose_s[after - 1])
-    fraction = fraction.clip(0.0, 1.0)
-    found = [interpolate(poses[after[i] - 1], poses[after[i]], fraction[i])[0] for i in kept]
+    fraction, later = fraction.clip(0.0, 1.0)[kept], after[kept]
+    found = interpolate(poses[later - 1], poses[later], fraction)
     for file in (file for i in kept for file in (color[i], depth[i])):
         if file is not None and not file.is_file():
             raise InputError(file, "missing, a list names it", "copy the sequence again")
@@ -291,13 +291,23 @@ def _read_tum(path: Path) -> PosedFrames:
         names=tuple(color[i].stem for i in kept),
         color=tuple(color[i] for i in kept),
         depth=tuple(depth[i] for i in kept),
-        world_from_cam=np.array(found),
+        world_from_cam=found,
     )
+
+
+def _nearest(times_s: Array, wanted_s: Array) -> NDArray[np.int64]:
+    """Return the index (M,) of the nearest of some times (N,) to each of others (M,)."""
+    order = np.argsort(times_s, kind="stable")
+    rising = times_s[order]
+    after = np.searchsorted(rising, wanted_s).clip(0, len(rising) - 1)
+    before = (after - 1).clip(0)
+    is_before = np.abs(rising[before] - wanted_s) <= np.abs(rising[after] - wanted_s)
+    return np.asarray(order[np.where(is_before, before, after)])
 
 
 def _lines(path: Path) -> Iterable[tuple[int, list[str]]]:
     with read_as(path, "a list of time stamps"):
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = read_text(path).splitlines()
     cells = ((number, line.partition("#")[0].split()) for number, line in enumerate(lines, 1))
     return [(number, row) for number, row in cells if row]
 

@@ -47,6 +47,7 @@ from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import pose_from_quat, quat_wxyz_of
 from synfeal.geometry.rigid import RIGID_BOUND, rigid_defects
+from synfeal.records.files import read_text
 from synfeal.records.tables import is_number, parse_cells
 
 Array = NDArray[np.float64]
@@ -125,7 +126,7 @@ def read_pose_list(path: Path, file_format: FormatName | None = None) -> PoseLis
     if not os.path.lexists(path):
         raise InputError(path, "missing", "give a file of poses, or a directory")
     with read_as(path, "poses"):
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, "utf-8-sig")
     if file_format == "kapture" or (file_format is None and is_kapture(text)):
         return read_kapture(path)
     rows = _rows(text.replace(",", " ") if file_format == "tum" else text)
@@ -204,7 +205,7 @@ def read_trajectory(path: Path) -> Trajectory:
         InputError: The file is missing, or a line holds no such pose.
     """
     with read_as(path, "a trajectory"):
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, "utf-8-sig")
     rows = _rows("\n".join(line.partition("#")[0] for line in text.splitlines()))
     if not rows:
         raise InputError(path, f"holds no poses; a trajectory has lines {TUM_ROW}")

@@ -21,9 +21,10 @@ from synfeal.dataset.frame_files import FrameFile, frame_file, sequence_at
 from synfeal.dataset.sequence_listing import gap_in, list_sequence
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.limits import FARTHEST_M
-from synfeal.records.files import atomic_path
+from synfeal.records.files import atomic_path, read_text
 
 SEQUENCE = re.compile(r"(sequence)?[0-9]{1,9}")
+MOST_POSE_BYTES = 2**16  # sixteen numbers
 SPLIT_FILES = {"train": "TrainSplit.txt", "test": "TestSplit.txt"}
 
 
@@ -33,10 +34,25 @@ def pose_text(world_from_cam: NDArray[np.float64]) -> str:
     return "".join(f"{row}\n" for row in rows)
 
 
+def pose_file_text(path: FrameFile) -> str:
+    """Read the text of a pose's file.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: It is no text, or no pose by its size.
+    """
+    if isinstance(path, Path):
+        return read_text(path, most_bytes=MOST_POSE_BYTES)
+    content = path.read_bytes(MOST_POSE_BYTES)
+    if b"\0" in content:
+        raise ValueError("it holds zero bytes, so it is no text")
+    return content.decode()
+
+
 def read_pose(path: FrameFile) -> NDArray[np.float64]:
     """Read a pose (4, 4) from a file of sixteen finite numbers in four rows."""
     with read_as(path, "a pose"):
-        rows = [line.split() for line in path.read_text(encoding="utf-8").splitlines() if line]
+        rows = [line.split() for line in pose_file_text(path).splitlines() if line]
         pose = np.array(rows, np.float64)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(path, "a pose is four rows of four finite numbers")
@@ -118,7 +134,7 @@ def read_split(dataset_dir: Path, split: str) -> list[Path]:
     if not os.path.lexists(path):
         raise InputError(path, "missing; a 7-Scenes data set has one")
     with read_as(path, "a list of sequences"):
-        lines = path.read_text(encoding="utf-8").split()
+        lines = read_text(path).split()
     bad = [line for line in lines if not SEQUENCE.fullmatch(line)]
     if bad:
         raise InputError(path, f"'{bad[0][:40]}' names no sequence; lines look like 'sequence1'")

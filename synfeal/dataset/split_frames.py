@@ -16,6 +16,7 @@ from synfeal.dataset.pose_table import HEADER, IMAGE, PoseTable, read_pose_table
 from synfeal.dataset.sequence_listing import Frame, SequenceListing, list_sequence, refuse_problems
 from synfeal.dataset.sevenscenes import SPLIT_FILES, read_split
 from synfeal.errors import InputError, read_as
+from synfeal.records.files import read_text
 
 _IMAGE_NAME = re.compile(r"([^/]+)/(frame-[0-9]{6,16})\.color\.[A-Za-z]+")
 
@@ -76,7 +77,7 @@ def read_image_names(table: Path) -> tuple[str, ...] | None:
         InputError: it cannot be read.
     """
     with read_as(table, "a pose table"):
-        header, *lines = table.read_text(encoding="utf-8").splitlines() or [""]
+        header, *lines = read_text(table).splitlines() or [""]
     if header != f"{HEADER},{IMAGE}":
         return None
     return tuple(line.rpartition(",")[2] for line in lines)

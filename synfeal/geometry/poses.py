@@ -74,8 +74,8 @@ def interpolate(pose_a: ArrayLike, pose_b: ArrayLike, fraction: ArrayLike) -> Ar
     Positions follow a straight line, rotations turn at constant angular velocity.
 
     Args:
-        pose_a: Pose (4, 4) at fraction 0.
-        pose_b: Pose (4, 4) at fraction 1.
+        pose_a: Pose at fraction 0, (4, 4) or one for each fraction (N, 4, 4).
+        pose_b: Pose at fraction 1, likewise.
         fraction: Fractions (N,), or a single one.
 
     Returns:
@@ -83,7 +83,7 @@ def interpolate(pose_a: ArrayLike, pose_b: ArrayLike, fraction: ArrayLike) -> Ar
     """
     a, b = np.asarray(pose_a, dtype=np.float64), np.asarray(pose_b, dtype=np.float64)
     fraction = np.atleast_1d(np.asarray(fraction, dtype=np.float64))
-    position = a[:3, 3] + fraction[:, None] * (b[:3, 3] - a[:3, 3])
+    position = a[..., :3, 3] + fraction[:, None] * (b[..., :3, 3] - a[..., :3, 3])
     return pose_from_quat(position, slerp_quat_wxyz(quat_wxyz_of(a), quat_wxyz_of(b), fraction))
 
 

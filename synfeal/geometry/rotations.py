@@ -102,11 +102,11 @@ def rotation_from_rpy(rpy_rad: ArrayLike) -> Array:
 
 
 def slerp_quat_wxyz(quat_a_wxyz: ArrayLike, quat_b_wxyz: ArrayLike, fraction: ArrayLike) -> Array:
-    """Interpolate quaternions (N, 4) on the shortest arc between two (4,) at fractions (N,)."""
+    """Interpolate on the shortest arc between quaternions, (4,) or (N, 4), at fractions (N,)."""
     from scipy.spatial.transform import Rotation
 
     a = Rotation.from_quat(np.asarray(quat_a_wxyz, dtype=np.float64), scalar_first=True)
     b = Rotation.from_quat(np.asarray(quat_b_wxyz, dtype=np.float64), scalar_first=True)
     step = (b * a.inv()).as_rotvec()
-    turned = Rotation.from_rotvec(np.outer(np.atleast_1d(fraction), step)) * a
+    turned = Rotation.from_rotvec(np.atleast_1d(fraction)[:, None] * step) * a
     return canonical_quat_wxyz(turned.as_quat(scalar_first=True))

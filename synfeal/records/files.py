@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import math
 import os
 import re
+import secrets
 import shutil
 import socket
-import tempfile
+import stat
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -33,26 +35,79 @@ def unfinished_prefix(name: str) -> str:
 def atomic_path(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside ``path``, same suffix, renamed to it if the block succeeds.
 
+    Where ``path`` is a link, it stays one, and the file that it leads to is written.
+
     Raises:
         OSError: it cannot be written; whatever the system calls the file, ``path`` is named.
     """
-    path = Path(path)
+    path = _end_of_links(Path(path))
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(
-        prefix=unfinished_prefix(path.stem), suffix=path.suffix, dir=path.parent
-    )
-    os.close(handle)
-    temporary = Path(name)
+    temporary = _unfinished(path)
     try:
+        temporary.open("xb").close()  # with the permissions that the user wants for new files
         yield temporary
-        temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
-        if error.filename in (None, name, temporary):
+        if error.filename in (None, str(temporary), temporary):
             error.filename = str(path)
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _unfinished(path: Path) -> Path:
+    """Choose a temporary name beside a file or directory, with the same suffix."""
+    begin = unfinished_prefix(path.stem if path.suffix else path.name)
+    return path.with_name(f"{begin}{secrets.token_hex(4)}{path.suffix}")
+
+
+def _end_of_links(path: Path) -> Path:
+    """Return where a link leads, so that the link stays and what it leads to is written.
+
+    Raises:
+        OSError: Links lead in a circle, or to a pipe or a device, which cannot be replaced.
+    """
+    end = Path(os.path.realpath(path)) if path.is_symlink() else path
+    if end.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.EINVAL, "Is a pipe or a device, not a file", str(path))
+    return end
+
+
+MOST_TEXT_BYTES = 2**29  # more than poses of a million frames take
+MOST_YAML_BYTES = 2**20  # settings and calibrations; a megabyte takes seconds to parse
+
+
+def read_text(path: Path, encoding: str = "utf-8", most_bytes: int = MOST_TEXT_BYTES) -> str:
+    """Read a text file as a whole.
+
+    Pipes and devices are not read: they may never end, or never begin.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: It is no regular file, larger than ``most_bytes``, or not text.
+    """
+    text = read_bytes(path, most_bytes).decode(encoding)
+    if "\0" in text:
+        raise ValueError("it holds zero bytes, so it is no text")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_bytes(path: Path, most_bytes: int) -> bytes:
+    """Read a file as a whole.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: It is a pipe or a device, or larger than ``most_bytes``.
+    """
+    status = path.stat()
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+        raise ValueError("it is a pipe or a device, which may never end; copy it to a file")
+    if status.st_size > most_bytes:
+        size_mb, most_mb = status.st_size / 1e6, most_bytes / 1e6
+        raise ValueError(f"it has {size_mb:.0f} MB, and more than {most_mb:.3g} MB are not read")
+    return path.read_bytes()  # of a directory, the system says what is wrong
 
 
 def read_json(path: Path) -> Any:
@@ -63,7 +118,7 @@ def read_json(path: Path) -> Any:
         ValueError: it is not UTF-8, not JSON, or nested too deeply.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         return json.loads(text, parse_constant=_finite, parse_float=_finite, parse_int=_whole)
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
@@ -122,6 +177,34 @@ def refuse_inside(out: Path, dataset: Path) -> None:
         )
 
 
+def refuse_unwritable(out: Path) -> None:
+    """Refuse a file or folder that could not be written, before the work for it is done.
+
+    Args:
+        out: File or folder that is to be written; folders that it lies in are made then.
+
+    Raises:
+        InputError: Nothing can be written there.
+    """
+    remedy = "choose another place with `out`"
+    try:
+        end = _end_of_links(out)
+        end.lstat()
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        raise InputError(out, str(error.strerror), remedy) from error
+    place = end.parent
+    while not os.path.lexists(place):
+        place = place.parent
+    try:
+        probe = place / f"{unfinished_prefix('probe')}{secrets.token_hex(4)}"
+        probe.open("xb").close()
+        probe.unlink()
+    except OSError as error:
+        raise InputError(out, f"cannot be written, {place}: {error.strerror}", remedy) from error
+
+
 def refuse_existing(path: Path) -> None:
     """Refuse to write where there is something already."""
     if path.is_symlink() and not path.exists():
@@ -177,15 +260,15 @@ def atomic_directory(path: Path, *, replace: bool = False) -> Iterator[Path]:
         InputError: ``path`` is not empty, and not to be replaced.
         OSError: The directory cannot be written.
     """
-    path = Path(path)
     if not replace:
-        refuse_existing(path)
+        refuse_existing(Path(path))
+    path = _end_of_links(Path(path))
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=unfinished_prefix(path.name), dir=path.parent))
+    temporary = path.with_name(f"{unfinished_prefix(path.name)}{secrets.token_hex(4)}")
+    temporary.mkdir()
     former = temporary.with_name(f"{temporary.name}-former")
     try:
         yield temporary
-        temporary.chmod(0o755)
         if replace and path.exists():
             path.rename(former)
         try:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.errors import InputError, read_as
-from synfeal.records.files import atomic_path
+from synfeal.records.files import atomic_path, read_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,7 +102,7 @@ def read_records(
             another length.
     """
     with read_as(path, "CSV", OSError, UnicodeDecodeError, remedy=f"; {remedy}"):
-        text = path.read_text(encoding="utf-8-sig")  # spreadsheets add a mark
+        text = read_text(path, "utf-8-sig")  # spreadsheets add a mark
     table = parse_cells(path, text, remedy=remedy, sep=sep)
     absent = [name for name in needed if name not in table.header]
     if absent:
@@ -331,7 +331,7 @@ def read_numbers(
             length, or a cell that holds no number.
     """
     with read_as(path, f"a {kind}"):
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, "utf-8-sig")
     table = parse_cells(path, text, f"a {kind}", skip_blank=False)
     names = header.split(",")
     columns = [*names, optional] if optional and optional in table.header else names

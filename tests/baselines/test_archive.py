@@ -160,7 +160,7 @@ def test_damage_ends_in_one_line(packed, tmp_path, damage, message, capsys):
 
 def test_a_member_that_says_it_is_huge_is_not_read(packed, monkeypatch):
     monkeypatch.setattr(archive_module, "MOST_BYTES", 100)
-    with pytest.raises(OSError, match="too many for a frame"):
+    with pytest.raises(OSError, match="too many for such a file"):
         ArchivedFile(packed / "seq-01.zip", "frame-000000.color.png").read_bytes()
     with pytest.raises(FileNotFoundError, match=r"seq-01\.zip/frame-000099\.color\.png"):
         ArchivedFile(packed / "seq-01.zip", "frame-000099.color.png").read_bytes()

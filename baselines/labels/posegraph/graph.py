@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from synfeal.dataset.pose_table import check_unit, whole_numbers
 from synfeal.errors import InputError, why
 from synfeal.geometry.poses import inverse, pose_from_quat, quat_wxyz_of, relative
-from synfeal.records.files import atomic_path
+from synfeal.records.files import atomic_path, read_text
 
 Array = NDArray[np.float64]
 
@@ -125,8 +125,8 @@ def read_g2o(path: Path) -> PoseGraph:
             edges do not join them all.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_text(path)
+    except (OSError, ValueError) as error:
         raise InputError(path, f"cannot be read as a g2o file ({why(error)})") from error
     vertices: dict[int, Array] = {}
     edges: list[Edge] = []
