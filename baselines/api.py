@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from baselines.config.learning import ModelName
 from synfeal.camera.photograph import PhotographCamera
@@ -162,6 +162,58 @@ def map(  # noqa: A001 (the name of the command)
     return build_map(frames, Path(out), seed)
 
 
+def build(
+    source: AnyPath,
+    out: AnyPath,
+    *,
+    format: str | None = None,  # noqa: A002 (the word of the command)
+    frames: int = 1000,
+    width: int = 320,
+    train: bool = False,
+    cores: int = 1,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """Build a place from a capture or a mesh; after an interruption, the same call continues.
+
+    Args:
+        source: Folder or file of a capture in any format of :mod:`synfeal.captures`, or a textured
+            mesh, of which nothing is scanned.
+        out: Folder of the place.
+        format: Format of the capture; None finds out.
+        frames: Frames that are rendered of the scan for the map.
+        width: Their width, pixels.
+        train: Train a localizer on them, too.
+        cores: Rendering processes.
+        seed: Seed of all random numbers.
+
+    Returns:
+        What was chosen and measured, as ``place.json`` holds it.
+
+    Raises:
+        InputError: The source or a setting cannot be used, or ``out`` holds something else.
+    """
+    from baselines.places.build import PlaceJob
+    from baselines.places.build import build as make
+
+    for name, value in (("frames", frames), ("cores", cores)):
+        if value < 1:
+            raise InputError(Argument(name), f"must be at least 1, found {value}")
+    if not 64 <= width <= 4096:
+        raise InputError(Argument("width"), f"must be 64 to 4096 pixels, found {width}")
+    _check_seed(seed)
+    job = PlaceJob(
+        source=Path(source),
+        out=Path(out),
+        format=format,
+        frames=frames,
+        width=width,
+        train=train,
+        cores=cores,
+        seed=seed,
+    )
+    return make(job)
+
+
 def localize(
     model: AnyPath,
     images: AnyPath | Sequence[AnyPath],
@@ -179,7 +231,7 @@ def localize(
     """Estimate where pictures were taken, with a model or a map of that place.
 
     Args:
-        model: ``model.pt`` of ``train`` or of the benchmark, or the folder that ``map`` wrote.
+        model: Folder of ``build`` or of ``map``, or ``model.pt`` of ``train`` or of the benchmark.
         images: PNG or JPEG of any size, or directories of them.
         out: CSV file to write.
         camera: Calibration of the photographs.
@@ -199,9 +251,11 @@ def localize(
     if place.is_dir():
         reason = "is for models, and a map is a folder"
         _refuse(place, reason, turns=turns, device=device)
+        from baselines.places.place import open_map
         from baselines.references.confidence import LEAST_CONFIDENCE
         from baselines.references.localized import localize_in_map
 
+        place, photographs = open_map(place, photographs)
         return localize_in_map(
             place,
             _paths(images),

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from baselines.cli import mapping, training
+from baselines.cli import mapping, places, training
 from synfeal.cli.options import command, keywords, option
 
 DEVICES = ("auto", "cpu", "cuda")
@@ -17,7 +17,7 @@ DEVICES = ("auto", "cpu", "cuda")
     "synfeal localize trained/model.pt photos/ --out poses.csv",
     option(
         "model",
-        "model.pt of synfeal train or of the benchmark, or the folder that synfeal map wrote",
+        "folder of synfeal build or synfeal map, or model.pt of synfeal train or of the benchmark",
         type=Path,
         metavar="MODEL",
     ),
@@ -44,4 +44,4 @@ def localize(arguments: argparse.Namespace) -> None:
     report.report_localized(arguments, done)
 
 
-COMMANDS = (training.train, mapping.map, localize)
+COMMANDS = (places.build, training.train, mapping.map, localize)

@@ -219,7 +219,7 @@ def _from_record(values: Any) -> Calibration | None:
         cy=cy,
         distortion=_five("distortion", _numbers(camera, ("distortion",), (5,))),
         projection="fisheye" if is_fisheye else None,
-        fisheye_k=_four(camera, ("fisheye_k",)) if "fisheye_k" in camera else None,
+        fisheye_k=_four(camera, ("fisheye_k",)) if camera.get("fisheye_k") else None,
     )
 
 

@@ -30,12 +30,15 @@ class PhotographCamera:
         focal_px: Focal length in pixels of the photographs, in place of a file.
         exif: Read the focal length from EXIF if neither is given.
         file: Path of the calibration file, for messages.
+        otherwise: Camera of photographs of which nothing else is known and whose sides have the
+            same ratio: that of the capture that their place was built from.
     """
 
     calibration: Calibration | None = None
     focal_px: float | None = None
     exif: bool = True
     file: Path | None = None
+    otherwise: Calibration | None = None
 
     @classmethod
     def read(cls, file: Path | None, focal_px: float | None, exif: bool) -> PhotographCamera:
@@ -89,10 +92,13 @@ class PhotographCamera:
             return self._calibrated(self.calibration, image.size, name, turn)
         if self.focal_px is not None:
             return _centred(width, height, self.focal_px)
-        if not self.exif:
+        focal_px = exif_focal_px(image) if self.exif else None
+        if focal_px is not None:
+            return _centred(width, height, focal_px)
+        if self.otherwise is None:
             return None
-        focal_px = exif_focal_px(image)
-        return None if focal_px is None else _centred(width, height, focal_px)
+        stored = _scaled(self.otherwise, upright_size(image.size, turn))
+        return None if stored is None else turned(stored, turn)
 
     def turns_with(self, image: Image.Image, turn: Orientation) -> bool:
         """Tell whether :meth:`of` turns the calibration file for a photograph."""

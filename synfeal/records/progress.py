@@ -4,11 +4,63 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 from tqdm import tqdm
 
 EVERY_S = 5.0  # between lines
 LARGE = 100_000  # counts that a bar shows in thousands
+
+
+class Outlook:
+    """Time left of a command of several stages, which the progress of each shows beside its own.
+
+    Args:
+        expected_s: Seconds that each stage takes on a usual machine by its name, in order. The pace
+            of the stages that are done scales those to come.
+    """
+
+    def __init__(self, expected_s: Mapping[str, float]) -> None:
+        self._expected_s = dict(expected_s)
+        self._names = list(expected_s)
+        self._at = 0
+        self._foreseen_s = self._spent_s = 0.0
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Count what is done in the block as one of the stages."""
+        self._at = self._names.index(name)
+        began_s = time.monotonic()
+        token = _OUTLOOK.set(self)
+        try:
+            yield
+        finally:
+            _OUTLOOK.reset(token)
+        self._foreseen_s += self._expected_s[name]
+        self._spent_s += time.monotonic() - began_s
+
+    @property
+    def place(self) -> str:
+        """Number of the stage among all, such as ``2/5``."""
+        return f"{self._at + 1}/{len(self._names)}"
+
+    @property
+    def later_s(self) -> float:
+        """Seconds that the stages after this one will take."""
+        pace = self._spent_s / self._foreseen_s if self._foreseen_s else 1.0
+        return pace * sum(self._expected_s[name] for name in self._names[self._at + 1 :])
+
+
+_OUTLOOK: ContextVar[Outlook | None] = ContextVar("outlook", default=None)
+
+
+def duration_text(seconds: float) -> str:
+    """Return a duration as a person says it: ``40 s``, ``12 min``, ``2.5 h``."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
 class Progress(tqdm):  # type: ignore[type-arg]
@@ -24,6 +76,9 @@ class Progress(tqdm):  # type: ignore[type-arg]
     """
 
     def __init__(self, total: int, name: str, n_done: int = 0, *, unit: str = "frame") -> None:
+        self._outlook = _OUTLOOK.get()
+        if self._outlook is not None:
+            name = f"{self._outlook.place} {name}"
         super().__init__(
             total=total,
             initial=n_done,
@@ -43,13 +98,24 @@ class Progress(tqdm):  # type: ignore[type-arg]
         self._n_done += int(n or 0)
         now_s = time.monotonic()
         n_new = self._n_done - self._n_before
-        if self.disable and n_new and now_s - self._said_s >= EVERY_S:
+        if n_new and now_s - self._said_s >= EVERY_S:
             self._said_s = now_s
             rate = n_new / (now_s - self._began_s)
             left_s = (self._n_all - self._n_done) / rate
-            line = f"{self._name}: {self._n_done} of {self._n_all} {self._units}"
-            print(f"{line}, {rate:.1f}/s, {left_s:.0f} s left", file=sys.stderr, flush=True)
+            in_all = self._in_all(left_s)
+            if self.disable:
+                line = f"{self._name}: {self._n_done} of {self._n_all} {self._units}"
+                said = f"{line}, {rate:.1f}/s, {left_s:.0f} s left{in_all}"
+                print(said, file=sys.stderr, flush=True)
+            else:
+                self.set_postfix_str(in_all.removeprefix(", "), refresh=False)
         return super().update(n)
+
+    def _in_all(self, left_s: float) -> str:
+        """Say how long the stages to come will take as well, if there are any."""
+        if self._outlook is None:
+            return ""
+        return f", {duration_text(left_s + self._outlook.later_s)} in all"
 
     def part_done(self, name: str, count: int, seconds: float) -> None:
         """Print a line about a finished part where there is no terminal for the bar.

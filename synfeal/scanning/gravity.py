@@ -22,6 +22,8 @@ SAMPLES = 30_000
 # tried; windows in which normals count as level or plumb, narrower with each refinement.
 MOST_TILT_DEG, STEP_DEG = 50.0, 1.5
 WINDOWS_DEG = (8.0, 5.0, 3.0, 2.0, 2.0, 2.0)
+# Least length of the mean of the upper edges of photographs that are held upright.
+LEAST_EDGE = 0.3
 # Share of the surface that must be level or plumb within the last window (of normals spread evenly
 # over all directions 3.6 % are), and share that must hold up where it is: level planes do, and the
 # lesser of two walls, but one wall leaves the rotation about its normal free.
@@ -29,6 +31,10 @@ MIN_AGREEING, MIN_HOLDING = 0.12, 0.02
 REMEDY = (
     "give `gravity=(X, Y, Z)`, the way things fall in the world of the poses, or `keep_axes=True`"
 )
+
+
+class GravityError(InputError):
+    """Neither the surface nor the photographs tell which way is up."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +60,13 @@ def find_gravity(surface: FusedSurface, world_from_cam: Array) -> Gravity:
         world_from_cam: Poses (N, 4, 4) of the photographs, held upright in the mean.
 
     Raises:
-        InputError: The surface has no planes that tell, or the photographs no upper edge.
+        GravityError: The surface has no planes that tell, or the photographs no upper edge.
     """
     guess = -world_from_cam[:, :3, 1].mean(axis=0)
-    if np.linalg.norm(guess) < 0.3:
-        raise InputError("scan", "the photographs are turned all ways, so up is not known", REMEDY)
+    if np.linalg.norm(guess) < LEAST_EDGE:
+        raise GravityError(
+            "scan", "the photographs are turned all ways, so up is not known", REMEDY
+        )
     guess /= np.linalg.norm(guess)
     normals = area_weighted_normals(surface, SAMPLES)
     tried = _directions_near(guess)
@@ -79,13 +87,29 @@ def find_gravity(surface: FusedSurface, world_from_cam: Array) -> Gravity:
         plumb=float((cosine < np.sin(last)).mean()),
     )
     if holding < MIN_HOLDING or found.level + found.plumb < MIN_AGREEING:
-        raise InputError(
+        raise GravityError(
             "scan",
             f"no gravity found: {found.level:.1%} of the surface is level and {found.plumb:.1%}"
             " plumb at the best",
             REMEDY,
         )
     return found
+
+
+def likely_up(world_from_cam: Array) -> Array:
+    """Return the axis (3,) of the world nearest to the upper edge of the photographs.
+
+    Worlds of captures mostly have one axis along the vertical, up or down. Where photographs are
+    turned all ways it is z.
+
+    Args:
+        world_from_cam: Poses (N, 4, 4) of the photographs.
+    """
+    edge = -world_from_cam[:, :3, 1].mean(axis=0)
+    if np.linalg.norm(edge) < LEAST_EDGE:
+        return np.array([0.0, 0.0, 1.0])
+    axis = int(np.abs(edge).argmax())
+    return np.asarray(np.sign(edge[axis]) * np.eye(3)[axis])
 
 
 def area_weighted_normals(surface: FusedSurface, count: int) -> Array:

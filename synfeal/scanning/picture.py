@@ -22,7 +22,8 @@ Rgb = NDArray[np.uint8]
 SHRINK = 2
 ROWS = 4  # frames in the picture
 TITLES = ("photograph", "rendering of the scan", "photograph red, rendering cyan", "difference x 2")
-TITLE_PX = 18
+# Height of text as a share of a tile's width: pictures of phones are shown much smaller.
+TEXT_SHARE, LEAST_TEXT_PX = 0.045, 10
 
 
 @dataclass(frozen=True)
@@ -84,17 +85,22 @@ def write_picture(compared: Sequence[Comparison], title: str, out: Path) -> None
     count = min(ROWS, len(compared))
     chosen = [compared[(2 * row + 1) * len(compared) // (2 * count)] for row in range(count)]
     height, width = chosen[0].photograph.shape[:2]
-    sheet = Image.new("RGB", (len(TITLES) * width, count * height + 2 * TITLE_PX), "white")
+    text_px = max(LEAST_TEXT_PX, round(TEXT_SHARE * width))
+    line_px = round(1.6 * text_px)
+    sheet = Image.new("RGB", (len(TITLES) * width, count * height + 2 * line_px), "white")
     pen = ImageDraw.Draw(sheet)
-    pen.text((4, 3), title, "black")
+    pen.text((4, 3), title, "black", font_size=text_px)
     for column, text in enumerate(TITLES):
-        pen.text((column * width + 4, TITLE_PX + 3), text, "black")
+        pen.text((column * width + 4, line_px + 3), text, "black", font_size=text_px)
     for row, one in enumerate(chosen):
-        top = 2 * TITLE_PX + row * height
+        top = 2 * line_px + row * height
         tiles = (one.photograph, one.rendering, overlay(one), _difference(one))
         for column, tile in enumerate(tiles):
             sheet.paste(Image.fromarray(tile), (column * width, top))
-        pen.text((4, top + 3), f"{one.name}: {one.difference:.1f} grey levels", "yellow")
+        said = f"{one.name}: {one.difference:.1f} grey levels"
+        pen.text(
+            (4, top + 3), said, "white", font_size=text_px, stroke_width=1, stroke_fill="black"
+        )
     with atomic_path(out) as temporary:
         sheet.save(temporary)
 

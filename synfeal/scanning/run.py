@@ -37,7 +37,7 @@ from synfeal.scanning.coloring import colors_of
 from synfeal.scanning.consistency import N_FRAMES as FIT_FRAMES
 from synfeal.scanning.consistency import ColorFit, fit_color, sightings_of, with_color
 from synfeal.scanning.fusion import FusedSurface, fuse
-from synfeal.scanning.gravity import find_gravity, upright_world
+from synfeal.scanning.gravity import GravityError, find_gravity, likely_up, upright_world
 from synfeal.scanning.picture import Comparison, compare, write_picture
 
 Array = NDArray[np.float64]
@@ -69,6 +69,8 @@ class ScanJob:
         gravity: Way down (3,) in the sequence's world; ``find`` takes it from the device
             where its capture says it, or else from the planes of the scene;
             ``keep`` leaves the axes as they are.
+        needs_gravity: Whether gravity that is not found ends the scan; otherwise an axis of the
+            world stands in, with a warning.
         keep_calibration: Use the colour calibration as it is given, not as photographs agree best.
     """
 
@@ -83,6 +85,7 @@ class ScanJob:
     min_piece_m2: float = 0.02
     poses_are: PosesAre = "world_from_cam"
     gravity: tuple[float, float, float] | Literal["find", "keep"] = "find"
+    needs_gravity: bool = True
     keep_calibration: bool = False
 
     def check(self) -> None:
@@ -227,11 +230,29 @@ def _world(
         sensed = known_up(job.sequence)
         if sensed is not None:
             return "sensed by the device", upright_world(surface, sensed)
-        found = find_gravity(surface, frames.world_from_cam)
+        try:
+            found = find_gravity(surface, frames.world_from_cam)
+        except GravityError as error:
+            if job.needs_gravity:
+                raise
+            return _stood_in(surface, frames, error)
         record = {"up": found.up.tolist(), "level": found.level, "plumb": found.plumb}
         return record, upright_world(surface, found.up)
     down = np.array(job.gravity, np.float64)
     return "given", upright_world(surface, -down / np.linalg.norm(down))
+
+
+def _stood_in(surface: FusedSurface, frames: PosedFrames, error: GravityError) -> tuple[str, Array]:
+    """Take an axis of the capture for the way up, and say so."""
+    up = likely_up(frames.world_from_cam)
+    axis = f"{'-' if up.sum() < 0 else '+'}{'xyz'[int(np.abs(up).argmax())]}"
+    log.warning(
+        "%s: %s of the capture is taken for up, to which the upper edges of its photographs are"
+        " nearest",
+        str(error).partition(";")[0],
+        axis,
+    )
+    return f"not found: {axis} of the capture stands in", upright_world(surface, up)
 
 
 def _mesh(

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,11 @@ from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.load import load_mesh
+from synfeal.scanning.camera import CameraOptions
 from synfeal.scanning.cleaning import without_small_pieces
 from synfeal.scanning.fusion import FusedSurface
-from synfeal.scanning.gravity import find_gravity
+from synfeal.scanning.gravity import GravityError, find_gravity, likely_up
+from synfeal.scanning.run import ScanJob, scan
 from tests.support.scan_sequence import (
     COLOR_PX,
     DEPTH_PX,
@@ -262,6 +265,42 @@ def test_cameras_turned_all_ways_have_no_upper_edge() -> None:
     turned = [pose_matrix(np.diag([-1.0, -1.0, 1.0]), np.zeros(3)), np.eye(4)]
     with pytest.raises(InputError, match="turned all ways"):
         find_gravity(surface_of(box.vertices, box.triangles), np.stack(turned))
+
+
+def test_an_axis_of_the_world_stands_in_for_the_way_up() -> None:
+    up = Rotation.from_rotvec([0.3, 0.1, 0.0]).as_matrix()  # held 18 degrees off
+    y_is_down = np.stack([pose_matrix(up, np.zeros(3))] * 3)
+    np.testing.assert_array_equal(likely_up(y_is_down), [0.0, -1.0, 0.0])
+    np.testing.assert_array_equal(likely_up(room_from_cam()), [0.0, 0.0, 1.0])
+    turned = [pose_matrix(np.diag([-1.0, -1.0, 1.0]), np.zeros(3)), np.eye(4)]
+    np.testing.assert_array_equal(likely_up(np.stack(turned)), [0.0, 0.0, 1.0])
+
+
+def test_a_scan_that_needs_no_gravity_warns_where_it_finds_none(
+    sequence: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def none_found(*_: object) -> None:
+        raise GravityError("scan: no gravity found: 1 % is level; give it")
+
+    monkeypatch.setattr("synfeal.scanning.run.find_gravity", none_found)
+    job = ScanJob(
+        sequence=sequence,
+        out=tmp_path / "room.glb",
+        cameras=CameraOptions(color_focal_px=COLOR_PX, depth_focal_px=DEPTH_PX),
+        stop=12,
+        voxel_m=VOXEL_M,
+    )
+    with pytest.raises(GravityError):
+        scan(job)
+    found = scan(replace(job, needs_gravity=False)).record
+    up = np.array(found["sequence_from_world"])[:3, 2]
+    assert sorted(np.abs(up)) == pytest.approx([0.0, 0.0, 1.0])
+    assert up @ SEQUENCE_FROM_ROOM[:3, 2] > 0.5  # of the six axes the one that leads up
+    assert found["gravity"].startswith("not found: ")
+    assert "scan: no gravity found: 1 % is level: " in caplog.text
 
 
 def test_small_pieces_are_dropped() -> None:

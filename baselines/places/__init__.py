@@ -1,0 +1,1 @@
+"""Places: one folder from a capture to what localizes photographs in it."""

@@ -1,0 +1,118 @@
+"""What to expect of a place: pictures of known pose, localized in its map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+import synfeal
+from baselines.places.place import Place
+from baselines.references.localized import FOUND, localize_in_map
+from synfeal.camera.photograph import PhotographCamera
+from synfeal.dataset.manifest import MANIFEST
+from synfeal.dataset.posed_sequence import PosedFrames
+from synfeal.geometry.poses import pose_error, pose_from_quat
+
+Array = NDArray[np.float64]
+# Pictures that are localized: half an hour's worth of a place would say little more.
+CHECKED = 60
+CLOSE_M, CLOSE_DEG = 0.05, 5.0
+# What the pictures are: photographs that the scan was not made of, photographs that it was made of,
+# renderings that the map was not made of.
+SPARED, FUSED, RENDERED = "spared photographs", "fused photographs", "renderings"
+
+
+@dataclass(frozen=True)
+class Known:
+    """Pictures whose poses are known.
+
+    Attributes:
+        kind: ``SPARED``, ``FUSED`` or ``RENDERED``.
+        files: Their files.
+        world_from_cam: Their poses (N, 4, 4) in the world that the map answers in.
+        camera: File with their calibration.
+    """
+
+    kind: str
+    files: tuple[Path, ...]
+    world_from_cam: Array
+    camera: Path
+
+
+def photographs_of(place: Place, frames: PosedFrames, stride: int) -> Known:
+    """Choose photographs of a capture evenly, among those that were not fused if there are any."""
+    spared = [index for index in range(len(frames)) if index % stride]
+    chosen = _evenly(spared or list(range(len(frames))))
+    return Known(
+        SPARED if spared else FUSED,
+        tuple(Path(str(frames.color[index])) for index in chosen),
+        frames.world_from_cam[chosen],
+        place.camera,
+    )
+
+
+def renderings_of(place: Place) -> Known:
+    """Take the test frames of the data set that a mesh was rendered into."""
+    test = synfeal.open_dataset(place.rendered).test
+    chosen = _evenly(list(range(len(test))))
+    return Known(
+        RENDERED,
+        tuple(Path(str(test.images[index])) for index in chosen),
+        test.world_from_cam[chosen],
+        place.rendered / MANIFEST,
+    )
+
+
+def _evenly(rows: list[int]) -> list[int]:
+    some = np.unique(np.linspace(0, len(rows) - 1, CHECKED).astype(np.int64))
+    return [rows[index] for index in some]
+
+
+def localize_known(place: Place, known: Known, seed: int) -> None:
+    """Write ``check.csv``: poses of pictures as the map finds them."""
+    camera = PhotographCamera.read(known.camera, None, exif=False)
+    localize_in_map(place.map, list(known.files), place.check, camera=camera, seed=seed)
+
+
+def check_of(place: Place, known: Known) -> dict[str, Any]:
+    """Compare the poses of ``check.csv`` with those that are known.
+
+    Returns:
+        Counts; medians and 90 % of the errors of the pictures that were localized; the share of all
+        that are within 5 cm and 5 degrees; for each picture its known position and its error, None
+        where it was not localized.
+    """
+    table = pd.read_csv(place.check).set_index("image").loc[[str(file) for file in known.files]]
+    found = (table["status"] == FOUND).to_numpy()
+    position_m, angle_deg = np.full(len(table), np.inf), np.full(len(table), np.inf)
+    if found.any():
+        values = table.loc[found, ["tx", "ty", "tz", "qw", "qx", "qy", "qz"]].to_numpy(np.float64)
+        poses = pose_from_quat(values[:, :3], values[:, 3:])
+        error_m, error_rad = pose_error(poses, known.world_from_cam[found])
+        position_m[found], angle_deg[found] = error_m, np.degrees(error_rad)
+    close = (position_m <= CLOSE_M) & (angle_deg <= CLOSE_DEG)
+    return {
+        "kind": known.kind,
+        "pictures": len(table),
+        "localized": int(found.sum()),
+        "position_m": _percentile(position_m[found], 50),
+        "position_90_m": _percentile(position_m[found], 90),
+        "orientation_deg": _percentile(angle_deg[found], 50),
+        "within_5cm_5deg": float(close.mean()),
+        "places": [
+            {
+                "position_m": pose[:3, 3].round(3).tolist(),
+                "error_m": round(float(error), 4) if np.isfinite(error) else None,
+            }
+            for pose, error in zip(known.world_from_cam, position_m, strict=True)
+        ],
+    }
+
+
+def _percentile(values: Array, percent: float) -> float | None:
+    return float(np.percentile(values, percent)) if len(values) else None
