@@ -300,20 +300,34 @@ def inspect(
     box: Sequence[tuple[float, float, float, float, float, float]] = (),
     up_axis: UpAxis = "auto",
     unit_m: float | None = None,
+    format: str | None = None,  # noqa: A002 (the word of the command)
 ) -> dict[str, Any]:
-    """Show what a mesh is and where cameras can be in it, before anything is collected.
+    """Show what a mesh is and where cameras can be in it, or what a capture holds.
 
     Args:
-        mesh: Mesh file.
+        mesh: Mesh file, or a capture in any format of :mod:`synfeal.captures`.
         out: Directory for numbers, picture and page; None for ``<name of the mesh>-inspect``.
         box: Where camera centres may be, metres; none: the mesh's bounds.
         up_axis: Up axis of the file: ``auto``, ``y`` or ``z``.
         unit_m: Metres per unit of the file; None to find one that makes a room of the mesh.
+        format: Format of a capture; None finds out.
 
     Returns:
         The numbers, as in ``inspect.json``; ``collect`` holds a suggested command, if there is one.
+        Of a capture, as in ``capture-inspect.json``.
     """
+    from synfeal.captures.formats import is_capture
+    from synfeal.inspection.captured import inspect_capture
     from synfeal.inspection.run import OUTPUTS, inspect_mesh
+
+    if format is not None or is_capture(Path(mesh)):
+        for name, value in (("box", box), ("unit_m", unit_m)):
+            if value:
+                raise InputError(
+                    Argument(name), f"is of meshes, and {mesh} is none", "leave it out"
+                )
+        folder = Path(f"{Path(mesh).resolve().stem}-inspect") if out is None else Path(out)
+        return inspect_capture(Path(mesh), folder, format)
 
     place = checked(PlaceConfig, {"mesh": mesh, "box": box, "up_axis": up_axis, "unit_m": unit_m})
     folder = Path(f"{place.mesh.stem}-inspect") if out is None else Path(out)
@@ -501,7 +515,7 @@ def evaluate(
     """Score poses of any common format against a data set.
 
     Args:
-        dataset: Data set, or a file of poses as the reference.
+        dataset: Data set, or a capture or a file of poses as the reference.
         poses: File of the poses to score.
         out: Directory for ``scores.csv``, ``errors.csv`` and ``errors.png``; None to write none.
         format: Format of the poses; None to recognise it by their content.

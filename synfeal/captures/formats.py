@@ -7,7 +7,7 @@ entry points in the group ``synfeal.captures``, whose objects are :class:`Captur
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import NamedTuple
@@ -78,6 +78,13 @@ def capture_formats() -> dict[str, CaptureFormat]:
             )
         found[other.name] = other
     return found
+
+
+def is_capture(path: Path, besides: Collection[str] = ()) -> bool:
+    """Tell whether a path is a capture in one of the formats, not counting some by name."""
+    if not path.exists():
+        return False
+    return any(one.is_at(path) for one in capture_formats().values() if one.name not in besides)
 
 
 def format_of(path: Path) -> CaptureFormat:

@@ -170,7 +170,8 @@ def pairs(arguments: argparse.Namespace) -> None:
     "synfeal evaluate mydata results_ace.txt --out scores",
     option(
         "dataset",
-        "directory of seq-01 or seq-01.zip, or a file of poses as the reference",
+        "directory of seq-01 or seq-01.zip; or, as the reference, a capture (docs/captures.md) or a"
+        " file of poses",
         type=Path,
         metavar="DATASET",
     ),

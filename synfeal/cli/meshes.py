@@ -153,18 +153,25 @@ def coverage_text(coverage: Mapping[str, Any]) -> str:
 
 
 @command(
-    "describe a mesh in numbers, a picture and a 3D view",
+    "describe a mesh in numbers, a picture and a 3D view; or a capture",
     "synfeal inspect scan.glb",
     *options_of(PlaceConfig, positional="mesh"),
     option("--out", "directory to write to (<name of the mesh>-inspect)", type=Path),
+    option("--format", "format of a capture, where its files fit several", metavar="NAME"),
     function="synfeal.api:inspect",
 )
 def inspect(arguments: argparse.Namespace) -> None:
     """Show what a mesh is and where cameras can be in it, before anything is collected.
 
     Writes numbers, a picture and an offline 3D page, and prints the command to collect a data set.
+    Of a capture (docs/captures.md), its frames, cameras, clock and extent, and two pictures.
     """
+    from synfeal.captures.formats import is_capture
     from synfeal.inspection.run import inspect_mesh
+
+    if arguments.format is not None or is_capture(arguments.mesh):
+        _inspect_capture(arguments)
+        return
 
     out = arguments.out or Path(f"{arguments.mesh.stem}-inspect")
     place = checked(PlaceConfig, given(arguments, PlaceConfig))
@@ -172,6 +179,18 @@ def inspect(arguments: argparse.Namespace) -> None:
     text = inspect_mesh(place.scene, out, unit_is_given, wording=wording)
     print(f"{out}: inspect.html, inspect.png and inspect.json\n")
     print(text)
+
+
+def _inspect_capture(arguments: argparse.Namespace) -> None:
+    from synfeal.api import inspect
+    from synfeal.inspection.captured import OUTPUTS, capture_text
+
+    out = arguments.out or Path(f"{arguments.mesh.resolve().stem}-inspect")
+    facts = inspect(out=out, format=arguments.format, **given(arguments, PlaceConfig))
+    print(f"{out}: {', '.join(OUTPUTS)}\n")
+    print(capture_text(facts))
+    if facts["depth"] is not None:
+        print(f"\nsynfeal build {arguments.mesh} --out place")
 
 
 @command(

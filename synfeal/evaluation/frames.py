@@ -18,7 +18,7 @@ from synfeal.dataset.images import image_size_and_turn
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.pose_list import KITTI, FrameKey, PoseList
 from synfeal.dataset.pose_table import IMAGE, read_pose_table
-from synfeal.dataset.posed_sequence import is_tum, read_posed_sequence
+from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.dataset.sequence_listing import (
     POSE,
     Frame,
@@ -125,17 +125,11 @@ def _is_unsplit(dataset: Path) -> bool:
     told = (MANIFEST, *SPLIT_FILES.values())
     if not dataset.is_dir() or any(os.path.lexists(dataset / name) for name in told):
         return False
-    return is_tum(dataset) or any(dataset.glob("frame-*")) or any(dataset.glob("seq-[0-9]*"))
+    return any(dataset.glob("frame-*")) or any(dataset.glob("seq-[0-9]*"))
 
 
 def _unsplit_photographs(dataset: Path) -> ScoredFrames:
     """Read all photographs of a folder that have a pose."""
-    if is_tum(dataset):
-        raise InputError(
-            dataset,
-            "poses of TUM RGB-D sequences are scored by the tools of that benchmark and by evo",
-            "give a folder of frame-000000.color.png and frame-000000.pose.txt",
-        )
     photographs = read_posed_sequence(dataset)
     frames = tuple(_frame_named(dataset, name) for name in photographs.names)
     stems = [frame.sequence.stem for frame in frames]

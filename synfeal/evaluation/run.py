@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from synfeal.captures.formats import is_capture
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.known_camera import camera_of_dataset
 from synfeal.dataset.pose_list import Convention, PoseList, named_convention
@@ -19,6 +20,7 @@ from synfeal.dataset.poses_in import FormatName, read_pose_list
 from synfeal.dataset.sequence_listing import DEPTH
 from synfeal.errors import Argument, InputError, why
 from synfeal.evaluation.bootstrap import FEWEST_PATHS
+from synfeal.evaluation.captured import captured_frames
 from synfeal.evaluation.estimates import checked_convention
 from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
@@ -41,6 +43,8 @@ Align = Literal["none", "se3", "sim3"]
 # Endings of the names of errors against the data set's poses and against the second yardstick.
 DATASET, LABELS = "", "_labels"
 DEFAULT_RATE_HZ = 30.0
+# Captures in this layout are read as data sets, splits and all.
+DATASET_FORMAT = "7scenes"
 
 
 class Settings(NamedTuple):
@@ -85,7 +89,7 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
     """Score poses.
 
     Args:
-        dataset: Data set, or a file of poses as the reference.
+        dataset: Data set, or a capture or a file of poses as the reference.
         poses: What is scored.
         settings: What a person may choose.
 
@@ -103,8 +107,12 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
         )
     if not np.isfinite(settings.offset_s):
         raise InputError(Argument("offset_s"), f"must be finite, found {settings.offset_s:g}")
-    frames = _scored(dataset, settings)
+    of_capture = is_capture(dataset, besides=(DATASET_FORMAT,))
+    frames = None if of_capture else _scored(dataset, settings)
     estimates = read_pose_list(poses, settings.file_format)
+    if frames is None:
+        _refuse_settings_of_datasets(dataset, settings)
+        frames = captured_frames(dataset, estimates, poses)
     _refuse_useless(dataset, poses, frames, estimates, settings)
     if frames.frame_key == "time":
         clock = Clock(settings.most_apart_s, settings.offset_s)
@@ -170,12 +178,17 @@ def _scored(dataset: Path, settings: Settings) -> ScoredFrames:
     """Read the frames of a data set, or of a file of poses."""
     if not dataset.is_file() or dataset.suffix == ".zip":
         return read_scored_frames(dataset, settings.split)
-    if settings.split != "test" or settings.camera is not None:
-        name = "camera" if settings.split == "test" else "split"
-        raise InputError(
-            Argument(name), f"{dataset} is a file of poses and has none", "leave it out"
-        )
+    _refuse_settings_of_datasets(dataset, settings)
     return read_reference(dataset)
+
+
+def _refuse_settings_of_datasets(reference: Path, settings: Settings) -> None:
+    """Refuse what a file of poses or a capture has no use for."""
+    for name, given in (("split", settings.split != "test"), ("camera", settings.camera)):
+        if given:
+            raise InputError(
+                Argument(name), f"goes with data sets, and {reference} is none", "leave it out"
+            )
 
 
 def _matched(
@@ -232,7 +245,9 @@ def _camera_and_depth(
     """Read camera and depth for the reprojection error; a file of poses has neither."""
     if frames.frame_key is not None:
         return None, None
-    camera = camera_of_dataset(dataset, settings.camera).config
+    known = camera_of_dataset(dataset, settings.camera)
+    # Of an unpacked capture depth has a camera of its own, in which points are projected then.
+    camera = known.config if known.assumed else known.depth
     return camera, _depth(frames, camera)
 
 

@@ -353,6 +353,35 @@ def colmap_binary(folder: Path) -> Array:
     return world_from_room
 
 
+def tum(folder: Path, count: int = 12) -> Array:
+    """A few frames of the benchmark's layout, whose Kinect is not calibrated.
+
+    Depth is taken a little after the photographs; poses come at a hundred a second, one of them at
+    the time of each photograph.
+    """
+    room = furnished_room((4.0, 12.0, 40.0))
+    kinect = CameraConfig(width=640, height=480, fx=525.0, fy=525.0, cx=320.0, cy=240.0)
+    rgb_lines, depth_lines, pose_lines = ["# colour"], ["# depth"], ["# ground truth"]
+    with open_renderer(room, kinect, RenderConfig()) as renderer:
+        for number, pose in enumerate(shots().room_from_cam[:count]):
+            image, depth_m = renderer.render_rgbd(pose)
+            time_s = 1305031229.5 + 0.1 * number
+            stamp, later = f"{time_s:.6f}", f"{time_s + 0.004:.6f}"
+            _png(folder / f"rgb/{stamp}.png", image)
+            stored = np.where(np.isfinite(depth_m), depth_m, 0.0) * 5000.0
+            _png(folder / f"depth/{later}.png", np.round(stored).astype(np.uint16))
+            rgb_lines.append(f"{stamp} rgb/{stamp}.png")
+            depth_lines.append(f"{later} depth/{later}.png")
+            matrix = LEANING_FROM_ROOM @ pose
+            quat_xyzw = Rotation.from_matrix(matrix[:3, :3]).as_quat()
+            for offset_s in (0.0, 0.01):  # the sensor rests for a moment
+                values = " ".join(f"{v:.9f}" for v in (*matrix[:3, 3], *quat_xyzw))
+                pose_lines.append(f"{time_s + offset_s:.6f} {values}")
+    for name, lines in (("rgb", rgb_lines), ("depth", depth_lines), ("groundtruth", pose_lines)):
+        _text(folder / f"{name}.txt", "\n".join(lines) + "\n")
+    return LEANING_FROM_ROOM
+
+
 WRITERS: dict[str, Callable[[Path], Array]] = {
     "7scenes": seven_scenes,
     "12scenes": twelve_scenes,

@@ -12,7 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
+import synfeal
+from synfeal.camera.calibration import read_calibration
 from synfeal.captures.capture import Capture
 from synfeal.captures.formats import CaptureFormat, capture_formats, format_of, read_capture
 from synfeal.captures.unpack import read_capture_record, unpack
@@ -27,11 +30,13 @@ from tests.support.capture_writers import (
     CY,
     FOCAL_PX,
     HEIGHT,
+    LEANING_FROM_ROOM,
     WIDTH,
     WRITERS,
     Y_UP_FROM_ROOM,
     Z_UP_FROM_ROOM,
     shots,
+    tum,
 )
 from tests.support.small_room import furnished_room
 
@@ -114,6 +119,7 @@ def test_unpacked_it_is_a_posed_sequence(captured, tmp_path):
     record = read_capture_record(done.folder)
     assert record["names"] == [frame.name for frame in capture.frames]
     assert record["camera"]["color"]["fx"] == pytest.approx(FOCAL_PX)
+    assert read_calibration(done.folder / "capture.json") == done.color
 
 
 def test_names_are_unique_and_in_order(captured):
@@ -122,6 +128,116 @@ def test_names_are_unique_and_in_order(captured):
     assert len(set(names)) == len(names)
     times = [frame.time_s for frame in capture.frames if frame.time_s is not None]
     assert times == sorted(times)
+
+
+def poses_csv(path: Path, names: list[str], poses: np.ndarray, lost: int = 0) -> Path:
+    """Poses as localize writes them, the last ones not localized."""
+    quat_wxyz = Rotation.from_matrix(poses[:, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
+    lines = ["image,tx,ty,tz,qw,qx,qy,qz,status,inliers,confidence"]
+    for index, name in enumerate(names):
+        there = index < len(names) - lost
+        values = [*poses[index, :3, 3], *quat_wxyz[index]] if there else [""] * 7
+        end = "localized,90,0.999" if there else "not localized,0,0.0"
+        lines.append(",".join([name, *map(str, values), end]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def named(frame) -> str:
+    return f"elsewhere/{Path(frame.color_file or frame.name).name}"
+
+
+def test_poses_of_photographs_kept_aside_are_scored(captured, tmp_path):
+    """A shift of 10 cm is found in every format; one that was not localized counts as lost."""
+    name, capture, world_from_room = captured
+    if name == "7scenes":
+        pytest.skip("read as a data set, with its splits")
+    aside = list(range(3, 19, 4))
+    poses = (world_from_room @ shots().room_from_cam)[aside]
+    poses[:, 0, 3] += 0.1
+    file = poses_csv(
+        tmp_path / "poses.csv", [named(capture.frames[index]) for index in aside], poses, lost=1
+    )
+    found = synfeal.evaluate(capture.path, file)
+    assert len(found.frames.names) == len(aside)
+    np.testing.assert_allclose(found.errors["position_m"], [0.1, 0.1, 0.1, np.inf], atol=1e-5)
+    np.testing.assert_allclose(found.errors["orientation_deg"][:3], 0.0, atol=1e-4)
+
+
+def test_poses_of_another_capture_are_refused(captured, tmp_path):
+    _, capture, _ = captured
+    if capture.format == "7scenes":
+        pytest.skip("read as a data set, with its splits")
+    file = poses_csv(tmp_path / "poses.csv", ["IMG_1.jpg"], shots().room_from_cam[:1])
+    with pytest.raises(InputError, match="none of its 1 poses is of a photograph of"):
+        synfeal.evaluate(capture.path, file)
+
+
+def test_inspected_it_says_what_it_holds(captured, tmp_path, capsys):
+    name, capture, world_from_room = captured
+    out = tmp_path / "inspected"
+    assert main(["inspect", str(capture.path), "--out", str(out)]) == 0
+    facts = json.loads((out / "capture-inspect.json").read_text())
+    place_m = (world_from_room @ shots().room_from_cam)[:, :3, 3]
+    assert (facts["format"], facts["frames"], facts["frames_with_depth"]) == (
+        capture.format,
+        len(place_m),
+        len(place_m),
+    )
+    np.testing.assert_allclose(facts["extent_m"], np.ptp(place_m, axis=0), atol=1e-3)
+    assert facts["color"]["focal_px"] == pytest.approx([FOCAL_PX] * 2, abs=0.01)
+    near, middle, far = facts["depth"]["range_m"]
+    assert 0.0 < near < middle < far < 7.0  # the diagonal of the room is 7 m
+    if name == "3d-scanner-app":
+        assert facts["clock"]["interval_s"] == pytest.approx(0.1)
+    for picture in ("capture-frames.png", "capture-path.png"):
+        with Image.open(out / picture) as image:
+            assert min(image.size) >= 400
+    assert f"synfeal build {capture.path}" in capsys.readouterr().out
+
+
+def test_options_of_meshes_are_refused_for_captures(tmp_path, capsys):
+    path, _ = written("7scenes", tmp_path)
+    assert main(["inspect", str(path), "--unit", "2"]) == 1
+    assert "--unit: is of meshes" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def benchmark_sequence(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("tum") / "room"
+    tum(folder)
+    return folder
+
+
+def test_a_sequence_of_the_tum_benchmark_comes_back(benchmark_sequence):
+    capture = read_capture(benchmark_sequence)
+    assert capture.format == "tum"
+    expected = LEANING_FROM_ROOM @ shots().room_from_cam[: len(capture)]
+    np.testing.assert_allclose(capture.world_from_cam, expected, atol=WRITTEN_TO)
+    depth_m, small_m = capture.frames[5].read_depth_m(), shots().depth_m[5]
+    assert depth_m.shape == (480, 640)
+    assert np.median(depth_m) == pytest.approx(np.median(small_m), rel=0.2)  # another lens
+    assert "uncalibrated Kinect" in capture.notes[0]
+
+
+@pytest.mark.parametrize("by", ["names", "times"])
+def test_poses_of_the_tum_benchmark_are_scored(by, benchmark_sequence, tmp_path):
+    capture = read_capture(benchmark_sequence)
+    poses = capture.world_from_cam[2:9].copy()
+    poses[:, 1, 3] -= 0.02
+    if by == "names":
+        names = [frame.color_file.name for frame in capture.frames[2:9]]
+        file = poses_csv(tmp_path / "poses.csv", names, poses)
+    else:
+        quat_xyzw = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+        file = tmp_path / "estimate.txt"
+        rows = [
+            " ".join(map(str, (frame.name, *pose[:3, 3], *quat)))
+            for frame, pose, quat in zip(capture.frames[2:9], poses, quat_xyzw, strict=True)
+        ]
+        file.write_text("\n".join(rows) + "\n")
+    found = synfeal.evaluate(benchmark_sequence, file)
+    np.testing.assert_allclose(found.errors["position_m"], [0.02] * 7, atol=1e-5)
 
 
 def test_a_phone_that_focuses_anew_is_drawn_as_one_camera(tmp_path):
