@@ -119,8 +119,11 @@ def map(  # noqa: A001 (the name of the command)
 ) -> StructureMap:
     """Build a map of image features, placed in space by depth, from renderings or photographs.
 
+    Features of photographs without depth are triangulated.
+
     Args:
-        dataset: Data set with depth, or posed photographs with depth.
+        dataset: Data set with depth, posed photographs, or a capture in any format of
+            :mod:`synfeal.captures`, such as a COLMAP model with its photographs.
         out: Folder to write.
         range: First frame and one past the last; None for all.
         stride: Take every such frame.
@@ -140,6 +143,7 @@ def map(  # noqa: A001 (the name of the command)
     Raises:
         InputError: The frames or a setting cannot be used, or ``out`` exists.
     """
+    from baselines.references.captured import as_sequence
     from baselines.references.map_frames import FrameChoice, read_map_frames
     from baselines.references.mapped import build_map
     from synfeal.api import rgbd_cameras
@@ -156,10 +160,11 @@ def map(  # noqa: A001 (the name of the command)
         depth_from_color,
         depth_scale,
     )
-    frames = read_map_frames(
-        folder=Path(dataset), choice=choice, cameras=cameras, poses_are=convention
-    )
-    return build_map(frames, Path(out), seed)
+    with as_sequence(Path(dataset)) as sequence:
+        frames = read_map_frames(
+            folder=sequence.folder, choice=choice, cameras=cameras, poses_are=convention
+        )
+        return build_map(sequence.named(frames), Path(out), seed)
 
 
 def build(

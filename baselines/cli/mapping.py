@@ -26,8 +26,8 @@ log = logging.getLogger("synfeal")
     "synfeal map mydata --out mymap",
     option(
         "dataset",
-        "data set of collect --depth, or posed photographs with depth (flat folder, seq-XX,"
-        " TUM RGB-D)",
+        "data set of collect --depth, posed photographs (flat folder, seq-XX, TUM RGB-D), or a"
+        " capture, such as a COLMAP model with its photographs (docs/captures.md)",
         type=Path,
         metavar="DATASET",
     ),

@@ -1,4 +1,4 @@
-"""Frames that a map is built from: rendered ones of a data set, or photographs with depth."""
+"""Frames that a map is built from: rendered ones of a data set, or photographs with poses."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ class MeshFile(Strict):
 
 @dataclass(frozen=True)
 class MapFrames:
-    """Frames with depth and poses, and the cameras that took them.
+    """Frames with poses, with depth or without, and the cameras that took them.
 
     Attributes:
         source: Folder they were read from.
         names: One for each frame.
         color: Colour images (N).
-        depth: Depth images (N).
+        depth: Depth images (N); none where features are to be triangulated.
         world_from_cam: Poses (N, 4, 4) of the colour camera.
         rgbd: Cameras of colour and depth.
         sequence_from_world: Rigid motion (4, 4) to the world of the sequence that the place was
@@ -65,6 +65,11 @@ class MapFrames:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    @property
+    def has_depth(self) -> bool:
+        """True where every frame has a depth image."""
+        return len(self.depth) == len(self.names)
 
     @property
     def posed_depth(self) -> PosedDepth:
@@ -185,7 +190,7 @@ def read_map_frames(
 
     Args:
         folder: A data set of ``synfeal collect`` with depth, of which training frames are taken, or
-            a posed sequence of photographs with depth.
+            a posed sequence of photographs, with depth or without.
         choice: Choice among the frames.
         cameras: Cameras given beside what the data set says.
         poses_are: Convention of the poses.
@@ -196,9 +201,12 @@ def read_map_frames(
     frames = slice(choice.start, choice.stop)
     rendered = (folder / MANIFEST).is_file()
     found = _training_frames(folder, frames) if rendered else read_posed_sequence(folder, frames)
-    if not found.has_depth:
-        remedy = "collect it with `depth=True`" if rendered else "give a sequence with depth images"
-        raise InputError(folder, "has no depth images, which put features into space", remedy)
+    if rendered and not found.has_depth:
+        raise InputError(
+            folder,
+            "has no depth images, which put features into space",
+            "collect it with `depth=True`",
+        )
     rows = choice.rows(len(found))
     color = [found.color[row] for row in rows]
     depth = [file for row in rows if (file := found.depth[row]) is not None]
@@ -206,7 +214,7 @@ def read_map_frames(
         options=cameras,
         sequence=folder,
         color_size=image_size(color[0]),
-        depth_size=image_size(depth[0]),
+        depth_size=image_size(depth[0] if depth else color[0]),
         is_tum=is_tum(folder),
     )
     return MapFrames(

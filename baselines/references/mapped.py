@@ -1,5 +1,7 @@
 """A map of a place: features of posed frames with their depth, and descriptors for retrieval.
 
+Depth is that of the frames where they have any, or triangulated (triangulated.py).
+
 ``synfeal map`` writes it, ``synfeal localize`` finds photographs in it (photographs.py). Nothing is
 trained but the vocabulary of DenseVLAD. A map is a folder of plain files::
 
@@ -28,6 +30,7 @@ from baselines.references.arrays import Vectors, read_arrays, write_arrays
 from baselines.references.descriptors import CHUNK, Vlad
 from baselines.references.features import Features
 from baselines.references.map_frames import MapFrames, MeshFile
+from baselines.references.triangulated import triangulated
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
@@ -137,7 +140,7 @@ def detect(sift: Any, grey: NDArray[np.uint8]) -> tuple[Array, NDArray[np.uint8]
 
 
 def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
-    """Build a map of posed frames with depth, and write it.
+    """Build a map of posed frames, and write it.
 
     Args:
         frames: The frames.
@@ -150,17 +153,18 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
     """
     refuse_existing(out)
     refuse_inside(out, frames.source)
-    check_depth(frames.posed_depth)
+    if frames.has_depth:
+        check_depth(frames.posed_depth)
     began = time.perf_counter()
     features, views = _read_frames(frames)
-    if len(features.slope) < FEWEST_FEATURES:
-        raise InputError(
-            frames.source,
-            f"only {len(features.slope)} features with depth in {len(frames)} frames, a map needs"
-            f" {FEWEST_FEATURES}; is it dark, or without texture?",
-        )
+    _refuse_few(features, frames)
     torch.set_num_threads(1)
     vlad = Vlad.learn(views, seed)
+    vectors = vlad.describe(views)
+    if not frames.has_depth:
+        focal_px = float(frames.camera.intrinsics[0])
+        features = triangulated(features, frames.world_from_cam, vectors, focal_px)
+    _refuse_few(features, frames)
     record = {
         "format": FORMAT,
         "version": VERSION,
@@ -178,7 +182,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         world_from_cam=frames.world_from_cam,
         camera=frames.camera,
         features=features,
-        vectors=vlad.describe(views),
+        vectors=vectors,
         vlad=vlad,
         sequence_from_world=frames.sequence_from_world,
         mesh_file=frames.mesh_file,
@@ -189,8 +193,22 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
     return made
 
 
+def _refuse_few(features: Features, frames: MapFrames) -> None:
+    """Refuse a map that cannot find a photograph."""
+    if len(features.slope) >= FEWEST_FEATURES:
+        return
+    question = "is it dark, or without texture?"
+    if not frames.has_depth:
+        question = "is it dark, without texture, or does each photograph show something else?"
+    raise InputError(
+        frames.source,
+        f"only {len(features.slope)} features with depth in {len(frames)} frames, a map needs"
+        f" {FEWEST_FEATURES}; {question}",
+    )
+
+
 def _read_frames(frames: MapFrames) -> tuple[Features, NDArray[np.uint8]]:
-    """Read features with depth, and the views (N, 64, 64, 3) that retrieval compares."""
+    """Read features, with depth if frames have it, and views (N, 64, 64, 3) for retrieval."""
     sift = detector()
     views = np.empty((len(frames), VIEW_PX, VIEW_PX, 3), np.uint8)
     found = []
@@ -202,7 +220,9 @@ def _read_frames(frames: MapFrames) -> tuple[Features, NDArray[np.uint8]]:
             grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
             pixel, descriptor = detect(sift, grey)
             slope = normalised_of_pixels(frames.camera, pixel)
-            depth_m = frames.depth_at(frames.read_depth_m(index), slope)
+            depth_m = np.zeros(len(slope))  # until it is triangulated
+            if frames.has_depth:
+                depth_m = frames.depth_at(frames.read_depth_m(index), slope)
             good = np.isfinite(depth_m) & np.isfinite(slope).all(axis=1)
             found.append((slope[good], depth_m[good], descriptor[good]))
             progress.update()

@@ -25,7 +25,7 @@ from synfeal.dataset.images import image_size
 from synfeal.dataset.pose_models import image_lines
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import inverse
-from synfeal.records.files import lies_in
+from synfeal.records.files import names_below
 
 MODELS = ("", "sparse/0", "sparse", "colmap/sparse/0", "model")
 IMAGES = ("images", "rgb", "", "../images", "../../images")
@@ -60,7 +60,7 @@ def _read(path: Path) -> Capture:
     for image in sorted(registered, key=lambda image: names[image.image_id]):
         name = names[image.image_id]
         photograph = root / name
-        if not lies_in(photograph, root):
+        if not names_below(name):
             raise InputError(folder, f"image '{name}' leads out of {root}")
         if not photograph.is_file():
             missing.append(name)

@@ -21,7 +21,7 @@ from synfeal.captures.formats import CaptureFormat
 from synfeal.captures.images import depth_reader, photograph_size, read_photograph
 from synfeal.dataset.images import image_size
 from synfeal.errors import InputError, read_as
-from synfeal.records.files import lies_in, read_json
+from synfeal.records.files import names_below, read_json
 
 NAME = "transforms.json"
 # Depth is in millimetres unless ``depth_unit_scale_factor`` says what else.
@@ -77,7 +77,7 @@ def _image_at(file: Path, name: Any, place: str) -> Path | None:
     if not isinstance(name, str) or not name:
         raise InputError(place, "must name an image")
     found = file.parent / name
-    if not lies_in(found, file.parent):
+    if not names_below(name):
         raise InputError(place, f"'{name}' leads out of the folder", "copy the image into it")
     for candidate in (found, *(found.with_name(found.name + end) for end in (".png", ".jpg"))):
         if candidate.is_file():

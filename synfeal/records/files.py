@@ -167,6 +167,11 @@ def lies_in(path: Path, folder: Path) -> bool:
     return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
 
 
+def names_below(name: str) -> bool:
+    """Check whether a name leads below the folder it starts in; links there are its owner's."""
+    return not Path(name).is_absolute() and ".." not in Path(name).parts
+
+
 def refuse_inside(out: Path, dataset: Path) -> None:
     """Refuse to write into a data set itself, whose files would no longer be its own."""
     if lies_in(out, dataset):
