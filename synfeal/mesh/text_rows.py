@@ -1,4 +1,8 @@
-"""Lines of numbers, millions at once: those of one form go through pandas together."""
+"""Lines of numbers, millions at once: those of one form go through pandas together.
+
+Every job that loads a mesh imports this module, and few of them read text: pandas, which takes half
+a second to import, is imported where it is used.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 Ints = NDArray[np.int64]
@@ -34,6 +37,8 @@ def lines_by_form(block: bytes) -> Iterator[tuple[Ints, bytes]]:
     if forms == first * count:
         yield np.arange(count), block
         return
+    import pandas as pd
+
     lines = block.split(b"\n")[:-1]
     form_of, distinct = pd.factorize(np.array(forms.split(b"\n")[:-1], object))
     order = np.argsort(form_of, kind="stable")
@@ -48,6 +53,8 @@ def table_of(block: bytes, n_columns: int, dtype: type) -> NDArray[Any]:
     Raises:
         ValueError: A line holds something else.
     """
+    import pandas as pd
+
     try:
         found = pd.read_csv(
             io.BytesIO(block),
