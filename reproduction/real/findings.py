@@ -88,7 +88,8 @@ def real_headline(root: Path, others: Path) -> str:
     head = f"{direction}; {int(main.n_test.iloc[0]):,} photographs:"
     note = (
         f"\\* Poses that [Brachmann et al.]({OTHERS_URL})"
-        f" publish of other photographs of the same room, its {int(published.n_test.iloc[0]):,} test"
+        " publish of other photographs of the same room, its"
+        f" {int(published.n_test.iloc[0]):,} test"
         " photographs, in a map of its training photographs. *Labels*: poses that the whole chain,"
         " from the scan on, is made from and scored against. Those of depth SLAM are themselves off"
         " by centimetres, so that every method that matches images seems worse by them. Rendered"
