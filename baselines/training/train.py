@@ -194,6 +194,7 @@ def train(job: TrainJob) -> TrainedModel:
     if (job.out / RECORD).exists():
         return _finished(job, settings, hashes)
     _refuse_useless(job, sets.learned)
+    _refuse_what_does_not_fit(job, network, sum(len(own.color) for own in sets.learned), device)
     for own in sets.learned:
         check_posed_depth(own, job.photographs)
     is_new = not job.out.exists()

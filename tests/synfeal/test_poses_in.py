@@ -48,7 +48,7 @@ def test_poses_are_put_in_order_of_time_and_the_first_of_two_is_kept(path):
     path.write_text("\n".join([*lines[5:], *lines[:5], " ".join([second[0], "9", *second[2:]])]))
     found = read_trajectory(path)
     assert len(found) == 13
-    ordered = found.by_time()
+    ordered = found.by_time(path)
     assert np.array_equal(ordered.stamps_s, np.sort(found.stamps_s[:12]))
     assert np.allclose(ordered.world_from_cam, POSES, rtol=0, atol=1e-9)
 

@@ -125,7 +125,7 @@ def test_labels_are_estimated_in_batches_as_long_as_the_papers_without_training(
     assert jobs["sfm"] == jobs["rgbd"] == jobs["estimate"] == 24 + 10  # 6,000 and 2,500 by 250
     assert jobs["posegraph"] == 2 * jobs["rgbd"]
     assert jobs["chain"] == 4
-    assert jobs["assistance"] == jobs["label_error"] == 1
+    assert jobs["side_table"] == 2  # assistance, label_error
 
 
 def test_changing_one_noise_level_adds_only_that_rows_jobs(tmp_path):
