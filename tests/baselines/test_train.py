@@ -356,7 +356,7 @@ def test_a_sequence_that_cannot_be_used_is_told_in_one_line(
     [
         (["--images", 0], "--images: must be 1 to 1,000,000,000, found 0"),
         (["--minutes", 0], "--minutes: must be above 0 and below 1e6, found 0"),
-        (["--minutes", 1, "--images", 9], "--minutes: images say how long already"),
+        (["--minutes", 1, "--images", 9], "--minutes: --images say how long already"),
         (["--held-out", 1], "--held-out: must be a share"),
         (["--range", 5, 5], "--range: 5 5 holds no frame"),
         (["--range", 100, 200], "none of them in the range"),
@@ -407,7 +407,7 @@ def test_data_sets_of_two_cameras_do_not_fit(calm, tmp_path, capsys):
 
 def test_the_network_has_the_shape_asked_for_and_localize_knows_it(photographs, tmp_path, capsys):
     out, poses = tmp_path / "trained", tmp_path / "poses.csv"
-    shape = ["--input-px", 48, "--width", 0.125, "--batch", 16]
+    shape = ["--input", 48, "--width", 0.125, "--batch", 16]
     given = ["train", photographs, "--out", out, "--images", 64, "--device", "cpu", *shape]
     assert main([str(argument) for argument in given]) == 0
     settings = json.loads((out / "training.json").read_text())["settings"]
@@ -450,10 +450,10 @@ def test_an_earlier_record_is_of_the_network_that_there_was(photographs, undistu
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--input-px", 8], "--input-px: "),
+        (["--input", 8], "--input: "),
         (["--width", 2], "--width: "),
         (["--batch", 0], "--batch: must be at least 1"),
-        (["--batch", 100_000_000], "lower --batch, --input-px or --width"),
+        (["--batch", 100_000_000], "lower --batch, --input or --width"),
         (["--start", "nowhere.pt"], "--start: nowhere.pt is no file"),
     ],
 )

@@ -42,15 +42,22 @@ def test_comments_blank_lines_and_a_byte_order_mark_are_passed_over(path):
     assert np.array_equal(read_trajectory(path).position_m, plain)
 
 
-def test_poses_are_put_in_order_of_time_and_the_first_of_two_is_kept(path):
+def test_poses_are_put_in_order_of_time_and_one_that_is_written_twice_is_kept_once(path):
     lines = path.read_text().splitlines()
-    second = lines[3].split()
-    path.write_text("\n".join([*lines[5:], *lines[:5], " ".join([second[0], "9", *second[2:]])]))
+    path.write_text("\n".join([*lines[5:], *lines[:5], lines[3]]))
     found = read_trajectory(path)
     assert len(found) == 13
     ordered = found.by_time(path)
     assert np.array_equal(ordered.stamps_s, np.sort(found.stamps_s[:12]))
     assert np.allclose(ordered.world_from_cam, POSES, rtol=0, atol=1e-9)
+
+
+def test_two_poses_of_one_time_are_refused(path):
+    stamp, _, *others = path.read_text().splitlines()[3].split()
+    with path.open("a") as file:
+        file.write(f"\n{' '.join([stamp, '9', *others])}\n")
+    with pytest.raises(InputError, match="two different poses"):
+        read_trajectory(path).by_time(path)
 
 
 @pytest.mark.parametrize(
