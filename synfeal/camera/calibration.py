@@ -65,6 +65,7 @@ BINARY = (
     "COLMAP's binary format is not read; convert the folder it is in: colmap model_converter"
     " --input_path IN --output_path OUT --output_type TXT, and take OUT/cameras.txt"
 )
+COLMAP_ROW = "must hold one line with CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]"
 PANORAMA = (
     "MODEL: EQUIRECTANGULAR has no calibration; leave the file out and give the projection"
     " equirectangular"
@@ -322,9 +323,24 @@ def _from_colmap(text: str) -> Calibration:
         raise ValueError(
             f"holds {len(rows)} cameras; keep the line of the one you want in a file of its own"
         )
-    if not rows or len(rows[0]) < 4:
-        raise ValueError("must hold one line with CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
-    _, model, width, height, *parameters = rows[0]
+    if not rows:
+        raise ValueError(COLMAP_ROW)
+    return colmap_camera(rows[0])
+
+
+def colmap_camera(cells: Sequence[str]) -> Calibration:
+    """Read one line of ``cameras.txt``.
+
+    Args:
+        cells: CAMERA_ID MODEL WIDTH HEIGHT PARAMS[].
+
+    Raises:
+        ValueError: It is no camera, or one whose lens is not read; the message begins with the
+            field.
+    """
+    if len(cells) < 4:
+        raise ValueError(COLMAP_ROW)
+    _, model, width, height, *parameters = cells
     if model == "EQUIRECTANGULAR":
         raise ValueError(PANORAMA)
     known = COLMAP_MODELS | COLMAP_FISHEYE

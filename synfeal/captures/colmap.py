@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
+import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from synfeal.camera.calibration import Calibration
+from synfeal.camera.calibration import Calibration, colmap_camera
 from synfeal.captures.capture import (
     Capture,
     CapturedFrame,
-    calibration,
     partial_read,
+    quat_pose,
     resized,
-    rigid_pose,
 )
 from synfeal.captures.formats import CaptureFormat
 from synfeal.captures.images import depth_reader, photograph_size, read_photograph
 from synfeal.dataset.depth import MILLIMETRES
 from synfeal.dataset.images import image_size
-from synfeal.dataset.pose_models import image_lines
+from synfeal.dataset.pose_models import NamedPose, colmap_images
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import inverse
 from synfeal.records.files import names_below
@@ -45,71 +42,71 @@ def _read(path: Path) -> Capture:
     folder = _model_of(path)
     if folder is None:
         raise InputError(path, "holds no cameras and images, .bin or .txt, of a COLMAP model")
-    with read_as(folder, "a model of COLMAP", OSError, ValueError, RuntimeError):
-        model = _reconstruction(folder)
-    registered = [model.images[i] for i in model.reg_image_ids()]
-    if not registered:
-        raise InputError(folder, "none of its images has a pose")
-    names = _names(folder, registered)
-    root = _photographs_of(path, folder, list(names.values()))
-    cameras = {
-        number: _camera(camera, f"{folder}: camera {number}")
-        for number, camera in model.cameras.items()
-    }
+    is_binary = all((folder / f"{kind}.bin").is_file() for kind in ("cameras", "images"))
+    end = ".bin" if is_binary else ".txt"
+    images = colmap_images(folder / f"images{end}")
+    root = _photographs_of(path, folder, [image.name for image in images])
+    cameras = _cameras_of(folder / f"cameras{end}", {image.camera for image in images})
     frames, missing = [], []
-    for image in sorted(registered, key=lambda image: names[image.image_id]):
-        name = names[image.image_id]
-        photograph = root / name
-        if not names_below(name):
-            raise InputError(folder, f"image '{name}' leads out of {root}")
+    for image in images:
+        photograph = root / image.name
+        if not names_below(image.name):
+            raise InputError(folder, f"image '{image.name}' leads out of {root}")
         if not photograph.is_file():
-            missing.append(name)
+            missing.append(image.name)
             continue
-        frames.append(_frame(path, name, image, photograph, cameras[image.camera_id]))
+        frames.append(_frame(path, image, photograph, cameras[image.camera]))
     notes = (f"{len(missing)} images are missing ({missing[0]}, ...)",) if missing else ()
     return Capture(path, FORMAT.name, tuple(frames), notes=notes)
 
 
-def _reconstruction(folder: Path) -> Any:
-    """Read cameras, images and poses of a model with COLMAP's own reader.
+def _cameras_of(file: Path, used: set[int]) -> dict[int, Calibration]:
+    """Read the cameras that images use.
 
-    Of text it is given what it needs, line by line: it skips every other image where the second
-    lines are left out, and wants a file of points that nothing here reads.
+    Raises:
+        InputError: One is missing, or has a lens that is not read.
     """
+    with read_as(file, "a model of COLMAP", OSError, struct.error, ValueError):
+        rows = _binary_rows(file) if file.suffix == ".bin" else _text_rows(file)
+    cameras = {}
+    for number in sorted(used):
+        if number not in rows:
+            raise InputError(
+                file, f"camera {number} is missing, and images name it", "copy it again"
+            )
+        try:
+            cameras[number] = colmap_camera(rows[number])
+        except ValueError as error:
+            raise InputError(f"{file}: camera {number}", str(error)) from error
+    return cameras
+
+
+def _text_rows(file: Path) -> dict[int, list[str]]:
+    """Read the lines of ``cameras.txt`` by the numbers of the cameras."""
+    lines = [line.split() for line in file.read_text(encoding="utf-8-sig").splitlines()]
+    return {int(cells[0]): cells for cells in lines if cells and not cells[0].startswith("#")}
+
+
+def _binary_rows(file: Path) -> dict[int, list[str]]:
+    """Read ``cameras.bin`` as the lines that COLMAP would write as text."""
     import pycolmap
 
-    if (folder / "images.bin").is_file():
-        points = folder / "points3D.bin"
-        if not points.is_file():
-            raise InputError(
-                points,
-                "missing",
-                "copy it, too, or convert the model to text, which does without: colmap"
-                " model_converter --output_type TXT",
-            )
-        return pycolmap.Reconstruction(folder)
-    with tempfile.TemporaryDirectory() as name:
-        copy = Path(name)
-        shutil.copyfile(folder / "cameras.txt", copy / "cameras.txt")
-        lines = [f"{line}\n\n" for line, _ in image_lines(folder / "images.txt")]
-        (copy / "images.txt").write_text("".join(lines), encoding="utf-8")
-        (copy / "points3D.txt").touch()
-        return pycolmap.Reconstruction(copy)
-
-
-def _names(folder: Path, images: list[Any]) -> dict[int, str]:
-    """Return the names of images by their numbers.
-
-    COLMAP's reader of text ends a name at its first blank; the rest of the line is the name.
-    """
-    names = {int(image.image_id): str(image.name) for image in images}
-    if (folder / "images.bin").is_file():
-        return names
-    for line, pose in image_lines(folder / "images.txt"):
-        number = int(line.split(None, 1)[0])
-        if number in names:
-            names[number] = pose.name
-    return names
+    content = file.read_bytes()
+    (count,) = struct.unpack_from("<Q", content)
+    models = {int(model.value): name for name, model in pycolmap.CameraModelId.__members__.items()}
+    rows, at = {}, struct.calcsize("<Q")
+    for _ in range(count):
+        number, model, width, height = struct.unpack_from("<IiQQ", content, at)
+        at += struct.calcsize("<IiQQ")
+        name = models.get(model, "INVALID")
+        if name == "INVALID":
+            raise ValueError(f"camera {number} is of the unknown model {model}")
+        camera = pycolmap.Camera.create_from_model_name(number, name, 1.0, 1, 1)
+        layout = f"<{len(camera.params)}d"
+        values = struct.unpack_from(layout, content, at)
+        at += struct.calcsize(layout)
+        rows[number] = [str(number), name, str(width), str(height), *map(repr, values)]
+    return rows
 
 
 def _photographs_of(path: Path, folder: Path, names: list[str]) -> Path:
@@ -125,35 +122,15 @@ def _photographs_of(path: Path, folder: Path, names: list[str]) -> Path:
     )
 
 
-def _camera(camera: Any, place: str) -> Calibration:
-    """Translate a camera; those of more coefficients than ours, and fisheyes of fewer, by name."""
-    model = camera.model.name
-    names = [name.strip() for name in camera.params_info.split(",")]
-    values: dict[str, float] = dict(zip(names, camera.params.tolist(), strict=True))
-    focal = values.get("f", 0.0)
-    pinhole = [values.get("fx", focal), values.get("fy", focal), values["cx"], values["cy"]]
-    radial = values.get("k", values.get("k1", 0.0))
-    if "FISHEYE" in model and "THIN" not in model:
-        k = (radial, *(values.get(name, 0.0) for name in ("k2", "k3", "k4")))
-        return calibration(
-            camera.width, camera.height, pinhole, place, projection="fisheye", fisheye_k=k
-        )
-    lens = (radial, *(values.get(name, 0.0) for name in ("k2", "p1", "p2", "k3")))
-    if any(values.get(name) for name in ("k4", "k5", "k6", "omega", "sx1", "sy1")):
-        raise InputError(place, f"a lens of {model} is not read", "undistort the images first")
-    return calibration(camera.width, camera.height, pinhole, place, distortion=lens)
-
-
-def _frame(
-    path: Path, name: str, image: Any, photograph: Path, camera: Calibration
-) -> CapturedFrame:
+def _frame(path: Path, image: NamedPose, photograph: Path, camera: Calibration) -> CapturedFrame:
     size = photograph_size(photograph, camera.width, camera.height)
     if size != (camera.width, camera.height):
         camera = resized(camera, *size)
-    depth = _depth_of(path, name)
-    pose = rigid_pose(image.cam_from_world().matrix(), f"image '{name}'")
+    depth = _depth_of(path, image.name)
+    x, y, z, w = (image.quat_wxyz[index] for index in (1, 2, 3, 0))
+    pose = quat_pose(image.translation, (x, y, z, w), f"{path}: image '{image.name}'")
     return CapturedFrame(
-        name=name,
+        name=image.name,
         read_color=partial_read(read_photograph, photograph, *size),
         camera=camera,
         world_from_cam=np.asarray(inverse(pose)),

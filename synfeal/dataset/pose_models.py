@@ -37,12 +37,14 @@ class NamedPose(NamedTuple):
         quat_wxyz: Four numbers of ``cam_from_world``.
         translation: Three numbers of ``cam_from_world``.
         place: Where it stands, for messages.
+        camera: Number of its camera; 0 where the model has none.
     """
 
     name: str
     quat_wxyz: tuple[float, ...]
     translation: tuple[float, ...]
     place: str
+    camera: int = 0
 
 
 def read_colmap(folder: Path) -> PoseList:
@@ -54,11 +56,26 @@ def read_colmap(folder: Path) -> PoseList:
     both = [name for name in MODELS if (folder / name).is_file()]
     if len(both) > 1:
         raise InputError(folder, "holds images.txt and images.bin", "leave one of them")
-    path = folder / both[0]
+    return _estimates("a COLMAP model", colmap_images(folder / both[0]))
+
+
+def colmap_images(path: Path) -> list[NamedPose]:
+    """List the images of a COLMAP model by name.
+
+    The second lines in ``images.txt``, of points, may be there or not: people leave them out by
+    mistake, and then COLMAP skips every other image. Its reader of binary files takes any number of
+    points that a damaged file claims.
+
+    Args:
+        path: ``images.txt`` or ``images.bin``.
+
+    Raises:
+        InputError: It is damaged, or has no image with a pose.
+    """
     poses = _text_poses(path) if path.name == TEXT else _binary_poses(path)
     if not poses:
         raise InputError(path, "this COLMAP model has no image with a pose")
-    return _estimates("a COLMAP model", sorted(poses, key=lambda pose: pose.name))
+    return sorted(poses, key=lambda pose: pose.name)
 
 
 def _estimates(kind: str, poses: list[NamedPose]) -> PoseList:
@@ -73,17 +90,6 @@ def _estimates(kind: str, poses: list[NamedPose]) -> PoseList:
 
 
 def _text_poses(path: Path) -> list[NamedPose]:
-    return [pose for _, pose in image_lines(path)]
-
-
-def image_lines(path: Path) -> list[tuple[str, NamedPose]]:
-    """List the first lines of the images in ``images.txt`` with what they say.
-
-    The second lines, of points, may be there or not: people leave them out by mistake.
-
-    Raises:
-        InputError: The file cannot be read, or holds a line that is neither.
-    """
     with read_as(path, "a COLMAP model"):
         lines = read_text(path, "utf-8-sig").splitlines()
     found = []
@@ -93,7 +99,7 @@ def image_lines(path: Path) -> list[tuple[str, NamedPose]]:
             continue
         pose = _pose_of_line(line, f"line {number}")
         if pose is not None:
-            found.append((line, pose))
+            found.append(pose)
         elif line.strip() and not is_points:
             raise InputError(
                 path, f"line {number} is no image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"
@@ -112,7 +118,8 @@ def _pose_of_line(line: str, place: str) -> NamedPose | None:
     numbers = [float(cell) for cell in cells[1:8]]
     if not abs(float(np.linalg.norm(numbers[:4])) - 1.0) <= NOT_UNIT:
         return None
-    return NamedPose(cells[9].strip(), tuple(numbers[:4]), tuple(numbers[4:]), place)
+    quat_wxyz, translation = tuple(numbers[:4]), tuple(numbers[4:])
+    return NamedPose(cells[9].strip(), quat_wxyz, translation, place, int(cells[8]))
 
 
 def _binary_poses(path: Path) -> list[NamedPose]:
@@ -128,7 +135,7 @@ def _binary_poses(path: Path) -> list[NamedPose]:
 
 
 def _binary_pose(file: BinaryIO, size: int) -> NamedPose:
-    image, *numbers, _ = _unpacked(file, "<I7dI")
+    image, *numbers, camera = _unpacked(file, "<I7dI")
     name = bytearray()
     while (byte := file.read(1)) != b"\0":
         if not byte or len(name) > MOST_NAME_BYTES:
@@ -140,7 +147,8 @@ def _binary_pose(file: BinaryIO, size: int) -> NamedPose:
         raise EOFError(f"the points of image {image} are cut off")
     file.seek(end)
     text = name.decode("utf-8")
-    return NamedPose(text, tuple(numbers[:4]), tuple(numbers[4:]), f"image {text}")
+    quat_wxyz, translation = tuple(numbers[:4]), tuple(numbers[4:])
+    return NamedPose(text, quat_wxyz, translation, f"image {text}", camera)
 
 
 def _unpacked(file: BinaryIO, layout: str) -> tuple[Any, ...]:
