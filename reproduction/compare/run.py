@@ -35,8 +35,8 @@ SHORT = ("position, labels", "orientation, labels", "position, true", "orientati
 UNSEEN = "·"
 LEGEND = (
     "Median errors, position in metres and orientation in degrees; B−A below zero is better. In"
-    f" brackets its 95 % limits from a bootstrap over the paths of the test set; {UNSEEN} means"
-    " that they hold zero: no difference seen. `labels` is the paper's protocol, `true` the"
+    f" brackets its 95 % limits over test paths and training runs; {UNSEEN} means that they hold"
+    " zero: no difference seen. `labels` is the paper's protocol, `true` the"
     " simulator's exact poses, `both` where these are the same numbers."
 )
 # Keys of provenance that are printed, and letters of their values.
@@ -44,12 +44,8 @@ MOST_CHANGES, WIDEST_VALUE = 30, 40
 Rows = list[Sequence[str]]
 OUTPUTS = ("compare.csv", "compare.md", "compare.png")
 ONE_SEED = (
-    "Their intervals say how far the test frames decide; training again with another seed and no"
-    " change could also look better or worse. Compare several seeds (training.repetitions) to tell."
-)
-SEVERAL_SEEDS = (
-    "Intervals say how far the test frames decide; ± is the standard error from the spread over"
-    " seeds. They are different uncertainties and are not merged."
+    "Of these, how far another training would move an error is taken from published runs of the"
+    " same localizer. Compare several seeds (training.repetitions) to know it of your own."
 )
 
 
@@ -140,12 +136,11 @@ def remarks_of(comparison: Comparison) -> list[str]:
         f"Runs with fewer than {FEWEST_PATHS} test paths: {few}; their intervals are too narrow,"
         " hence the question marks.": few,
         f"Runs with one seed in a tree: {single}. {ONE_SEED}": single,
-        SEVERAL_SEEDS: not single,
         f"Failed predictions: {failed_a} in A, {failed_b} in B; each counts as an infinite"
         " error.": failed_a + failed_b,
-        f"Were both trees equally good on all views, about {by_chance:.1f} of the {len(runs)}"
-        " intervals of a measure would still miss zero by the choice of test paths. Runs share test"
-        " frames, so the sign test is a guide, not a proof.": True,
+        f"Were both trees equally good, about {by_chance:.1f} of the {len(runs)} intervals of a"
+        " measure would still miss zero by chance. Runs share test frames, so the sign test is a"
+        " guide, not a proof.": True,
         f"Keys of provenance.json that differ: {0 if changes is None else len(changes)}.": (
             changes is not None
         ),
@@ -191,10 +186,9 @@ def _cells(row: Any, digits: int) -> tuple[str, ...]:
     number, signed = f"{{:.{digits}f}}", f"{{:+.{digits}f}}"
     errors = ["failed" if math.isinf(e) else number.format(e) for e in (row.a, row.b)]
     low, difference, high = (_signed(v, signed) for v in (row.low, row.difference, row.high))
-    spread = "" if math.isnan(row.se_seeds) else f" ± {number.format(row.se_seeds)}"
     doubt = "?" if min(row.n_paths_a, row.n_paths_b) < FEWEST_PATHS else ""
     verdict = UNSEEN if row.verdict == VERDICTS["unseen"] else row.verdict + doubt
-    return (*errors, difference + spread, f"[{low}, {high}]", verdict)
+    return (*errors, difference, f"[{low}, {high}]", verdict)
 
 
 def _signed(value: float, form: str = "{:+.1f} %") -> str:

@@ -1,4 +1,4 @@
-"""Differences of medians: known shifts, scipy's bootstrap, and how often the limits hold."""
+"""Differences of medians: known shifts, SciPy's bootstrap and t-test, and how often limits hold."""
 
 import math
 
@@ -9,8 +9,10 @@ from scipy import stats
 
 from reproduction.compare.stats import RunErrors, compare_errors, draws_of
 from reproduction.statistics.limits import MEASURES
+from reproduction.statistics.seeds import borrowed_deviations
 
 N = 120
+UNPUBLISHED = "other"  # a localizer without published runs: a single run tells of paths alone
 
 
 def run(*seeds, path=None):
@@ -20,8 +22,8 @@ def run(*seeds, path=None):
     return RunErrors(frame, frame if path is None else path, errors)
 
 
-def difference(a, b, paired=True):
-    found = compare_errors(a, b, paired)
+def difference(a, b, paired=True, model=UNPUBLISHED):
+    found = compare_errors(a, b, paired, model)
     assert found.measure.tolist() == list(MEASURES)
     return found.iloc[0]
 
@@ -73,30 +75,58 @@ def test_failures_make_a_run_worst_and_few_move_the_median_as_large_errors_would
     assert difference(run(errors), run(some)).difference > 0
 
 
-def test_seeds_give_means_and_the_standard_error_of_welch_and_one_has_no_deviation(errors):
+def test_limits_of_seeds_that_differ_by_a_constant_are_those_of_welchs_t_test(errors):
     a, b = [errors + s for s in (0.0, 0.3, 0.1)], [errors + s for s in (0.5, 0.9)]
     found = difference(run(*a), run(*b))
     medians = [[float(np.median(values)) for values in seeds] for seeds in (a, b)]
     assert found.difference == pytest.approx(0.7 - 0.4 / 3)
     assert [found.sd_a, found.sd_b] == pytest.approx([np.std(m, ddof=1) for m in medians])
-    welch = stats.ttest_ind(medians[1], medians[0], equal_var=False)
-    assert found.difference / found.se_seeds == pytest.approx(welch.statistic)
+    welch = stats.ttest_ind(medians[1], medians[0], equal_var=False).confidence_interval(0.95)
+    assert [found.low, found.high] == pytest.approx(list(welch))
     failed = np.full(N, np.inf)
     found = difference(run(errors, errors + 1, failed), run(errors, errors + 3))
     assert found.sd_a == pytest.approx(math.sqrt(0.5))  # of the two that are finite
     assert found.sd_b == pytest.approx(math.sqrt(4.5))
-    assert found.se_seeds == pytest.approx(math.sqrt(0.5 / 2 + 4.5 / 2))
-    found = difference(run(errors, errors + 1), run(errors))
-    assert np.isnan([found.sd_b, found.se_seeds]).all()
-    found = difference(run(errors), run(errors, errors + 1))
-    assert np.isnan([found.sd_a, found.se_seeds]).all()
+    assert (found.low, found.difference) == (-math.inf, -math.inf)  # one of three has failed
+    assert np.isnan(difference(run(errors, errors + 1), run(errors)).sd_b)
     assert np.isnan(difference(run(errors, failed), run(errors, errors + 1)).sd_a)
+
+
+def test_single_runs_borrow_the_deviation_of_published_ones(errors):
+    found = difference(run(errors), run(errors + 1.0), model="posenet2")
+    known = borrowed_deviations()["posenet2", "position_m"]
+    medians = np.array([np.median(errors), np.median(errors) + 1.0])
+    deviation = medians * np.sinh(known.relative_sd)  # half of what one deviation up and down span
+    error = math.hypot(*deviation)
+    freedom = error**4 / ((deviation**4).sum() / known.degrees_of_freedom)
+    width = stats.t.ppf(0.975, freedom) * error
+    assert [found.low, found.high] == pytest.approx([1.0 - width, 1.0 + width])
+
+
+def test_another_seed_of_the_same_training_is_rarely_told_apart():
+    rng = np.random.default_rng(3)
+    path = np.arange(N) // 4
+    known = borrowed_deviations()["posenet2", "position_m"]
+    told = {"posenet2": 0, UNPUBLISHED: 0}
+    for _ in range(40):
+        hard = rng.lognormal(sigma=0.5, size=N)
+        a, b = (
+            hard * np.exp(known.relative_sd * rng.normal() + 0.1 * rng.normal(size=N))
+            for _ in range(2)
+        )
+        for model in told:
+            found = difference(run(a, path=path), run(b, path=path), model=model)
+            told[model] += found.verdict != "no difference seen"
+    assert told["posenet2"] <= 6  # 2 on average; more than 6 in one of two hundred cases
+    assert told[UNPUBLISHED] >= 8  # by paths alone a quarter are
 
 
 def test_each_measure_is_compared_with_itself(errors):
     frame = np.arange(N)
     a, b = (np.stack([(k + 1) * errors + shift * k for k in range(4)])[None] for shift in (0, 1))
-    found = compare_errors(RunErrors(frame, frame, a), RunErrors(frame, frame, b), paired=True)
+    found = compare_errors(
+        RunErrors(frame, frame, a), RunErrors(frame, frame, b), paired=True, model=UNPUBLISHED
+    )
     assert found.a.tolist() == pytest.approx([(k + 1) * np.median(errors) for k in range(4)])
     assert found.difference.tolist() == pytest.approx([0, 1, 2, 3])
 
@@ -105,7 +135,8 @@ def test_draws_are_a_thousand_and_others_for_the_other_tree():
     path = np.array([7, 7, 2, 9])
     (place, a), (_, again), (_, b) = (draws_of(path, tree) for tree in "aab")
     assert place.tolist() == [1, 1, 0, 2]
-    assert a.shape == (1000, 3)
+    assert a.shape == (1001, 3)
+    assert (a[0] == 1).all()  # what was observed
     assert (a.sum(axis=1) == 3).all()
     np.testing.assert_array_equal(a, again)
     assert not np.array_equal(a, b)
@@ -115,7 +146,7 @@ def test_limits_are_differences_that_occur_between_the_outer_two_and_a_half_perc
     a, b = np.random.default_rng(8).lognormal(size=(2, 30))
     found = difference(run(a), run(b))
     _, counts = draws_of(np.arange(30), "a")
-    drawn = np.array([np.median(np.repeat(b, k)) - np.median(np.repeat(a, k)) for k in counts])
+    drawn = np.array([np.median(np.repeat(b, k)) - np.median(np.repeat(a, k)) for k in counts[1:]])
     assert (drawn < found.low).mean() <= 0.026 <= (drawn <= found.low).mean()
     assert (drawn > found.high).mean() <= 0.026 <= (drawn >= found.high).mean()
     whole = np.arange(N, dtype=float)
