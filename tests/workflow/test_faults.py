@@ -30,8 +30,8 @@ from synfeal.mesh.save import save_glb
 from synfeal.mesh.triangles import Triangles, load_collision_mesh, save_collision_mesh
 from synfeal.records.files import read_json, write_json, write_text
 from synfeal.records.lock import begin_run, remove_unfinished
-from tests.reproduction.test_core import run_job
 from tests.support.collected import painted
+from tests.support.jobs import run_job
 from tests.support.small_disk import mounted, remount
 from tests.workflow.test_workflow import snakemake
 

@@ -1,9 +1,7 @@
-"""What every stage leans on: whole files or none, tables, seeds by name, one line for a person."""
+"""What every stage leans on: whole files or none, tables, seeds by name, reasons in words."""
 
 import io
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -98,57 +96,6 @@ def test_seeds_depend_on_every_component_and_on_nothing_else():
     assert len({seed_of(*name) for name in names}) == len(names)
     assert 0 <= seed_of("x") < 2**63
     assert generator_of("x").integers(2**40) == generator_of("x").integers(2**40)
-
-
-def run_job(tmp_path, body):
-    log = tmp_path / "job.log"
-    script = (
-        "import os, sys\nfrom synfeal.errors import InputError\n"
-        "from reproduction.runs.job import job\n"
-        f"with job({str(log)!r}):\n    print('spoken')\n    os.system('echo native')\n    {body}\n"
-    )
-    command = [sys.executable, "-c", script]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
-def test_job_tells_a_person_one_line_and_logs_the_rest_and_a_defects_traceback(tmp_path):
-    run = run_job(tmp_path, "raise InputError('mesh.glb: holds no faces;\\n export it again')")
-    assert run.returncode == 1
-    assert run.stderr == "error: mesh.glb: holds no faces; export it again\n"
-    assert run.stdout == ""
-    log = (tmp_path / "job.log").read_text()
-    assert "spoken" in log
-    assert "native" in log
-    run = run_job(tmp_path, "1 / 0")
-    assert run.returncode == 1
-    assert "ZeroDivisionError" in (tmp_path / "job.log").read_text()
-
-
-CALL = """
-import json
-from pathlib import Path
-from reproduction.runs.job import run_job
-from synfeal.config.dataset import CameraConfig
-
-def draw(camera: CameraConfig, count: int, out: Path) -> None:
-    print("drawing")
-    out.write_text(json.dumps([camera.width, count]))
-
-run_job({log!r}, draw, camera={{"width": 64, "height": 48}}, count="3", out={out!r})
-"""
-
-
-def test_a_job_hands_its_function_what_that_annotates(tmp_path):
-    log, out = tmp_path / "job.log", tmp_path / "out.json"
-    code = CALL.format(log=str(log), out=str(out))
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert run.returncode == 0, run.stderr
-    assert json.loads(out.read_text()) == [64, 3]
-    assert log.read_text() == "drawing\n"
-    wrong = code.replace("count='3'", "count='x'").replace('count="3"', 'count="x"')
-    run = subprocess.run([sys.executable, "-c", wrong], capture_output=True, text=True, check=False)
-    assert run.returncode == 1
-    assert "count" in log.read_text()
 
 
 SCHEMA = {"name": TEXT, "n": COUNT, "x": NUMBER, "y": MAYBE, "k": MAYBE_COUNT}
