@@ -76,7 +76,9 @@ def draws_of(path: NDArray[np.int64], tree: str) -> tuple[Counts, Counts]:
     return place, path_counts(len(names), rng, RESAMPLES)
 
 
-def _difference(runs_a: list[Array], runs_b: list[Array], model: str, measure: str) -> dict[str, Any]:
+def _difference(
+    runs_a: list[Array], runs_b: list[Array], model: str, measure: str
+) -> dict[str, Any]:
     """Compare two runs by one measure, from the medians (1 + 1000,) of each of their seeds."""
     relative_sd, layout = _layout(len(runs_a), len(runs_b), model, measure)
     sample_a = layout.sample(runs_a, 0, relative_sd)

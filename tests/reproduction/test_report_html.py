@@ -73,7 +73,6 @@ CHANGED = {
     "tables/assistance": ("last_m_before_median", "77.875", "77.88 m, "),
     "tables/label_error": ("position_m_median", "0.07654", " 0.0765 "),
     "tables/speed_vs_error": ("faces", "4567", "4,567"),
-    "tables/hard_cases": ("naive_error", "0.0625", "✗ 0.062"),
 }
 
 

@@ -26,7 +26,7 @@ from tests.support.added_methods import install
 
 ROW = {"table": "table4_size", "scene": "large_room", "size": "6k"}
 SFM = {**ROW, "table": "table2_ground_truth", "labels": "sfm"}
-ALWAYS = {"table1_meshes", "references", "recall", "speed_vs_error", "hard_cases"}
+ALWAYS = {"table1_meshes", "references", "recall", "speed_vs_error"}
 PAGE = (ROOT / "docs/adding.md").read_text()
 (EXAMPLE,) = re.findall(r"`my_tables/worst\.py`:\n\n```python\n(.*?)```", PAGE, re.DOTALL)
 

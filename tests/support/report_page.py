@@ -36,9 +36,7 @@ CLAIM = dict.fromkeys(COLUMNS, "") | {
 UNTESTED = CLAIM | dict.fromkeys(("verdict_labels", "verdict_true"), "not testable here")
 UNTESTED |= {"id": "C15", "statement": "Another.", "reason": "no row 40k"}
 PUBLISHED = CONFIG.parent / "results/published/mini"
-SIDE_TABLES = (
-    *("speed_vs_error", "recall", "assistance", "label_error", "references", "hard_cases"),
-)
+SIDE_TABLES = ("speed_vs_error", "recall", "assistance", "label_error", "references")
 
 
 def large_room_design():

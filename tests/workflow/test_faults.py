@@ -158,7 +158,7 @@ def test_a_second_run_is_refused_until_the_first_is_dead(tmp_path):
     with other_run(root) as process:
         with pytest.raises(InputError, match=rf"another run .* \(process {process.pid} on "):
             begin_run(root)
-        second = smoke(root.parent, f"{root}/tables/hard_cases.csv")
+        second = smoke(root.parent, f"{root}/tables/table1_meshes.csv")
         assert second.returncode == 1
         errors = [line for line in second.stderr.splitlines() if line.startswith("error:")]
         assert errors == [line for line in errors if "another run is at work there" in line] != []

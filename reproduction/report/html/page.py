@@ -75,6 +75,10 @@ def data_address(path: Path) -> str:
 CLAIMS, PROVENANCE = "claims.csv", "provenance.json"
 # Beside the results of a profile may lie those of `make real`, which has no part in any profile.
 REAL = "real"
+HARD_CASES = (
+    "Functions that all of this rests on are tested where textbook formulas lose precision:"
+    " tests/hard_cases."
+)
 REAL_CAPTIONS = {
     "real_amount": "Photographs that were not scanned: errors of PoseNet2 against the number of"
     " rendered frames, and against the number of photographs that were scanned.",
@@ -108,7 +112,11 @@ def write_report(
         profile=root.name,
         opening=opening(root),
         found=findings(root) if can_tell(root) else [],
-        sentences=[*run_sentences(cells), *([cost_sentence(origin)] if origin else [])],
+        sentences=[
+            *run_sentences(cells),
+            *([cost_sentence(origin)] if origin else []),
+            HARD_CASES,
+        ],
         counts=verdict_table(claims) if claims else "",
         claims=claims_table(claims) if claims else "",
         tables=[*_tables(cells, side_tables, root), *_real_table(root.with_name(REAL))],

@@ -2,7 +2,7 @@
 
 ``values.json`` holds, by family and case, ``truth``: quotients, or decimals of 30 digits;
 ``inputs``: doubles that were rounded once and for all, where a case needs them; ``naive_error`` of
-the textbook formula. ``python -m tests.support.hard_case_values`` computes all of them.
+the textbook formula. ``python -m tests.hard_cases.truths`` computes all of them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""List hard cases; a new one is a line here and one in ``tests.support.hard_case_values``."""
+"""List hard cases; a new one is a line here and one in ``tests.hard_cases.truths``."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reproduction.hard_cases import estimates, scenes
-from reproduction.hard_cases.values import REFUSED, Values, error_of, stored_values
 from reproduction.statistics import limits
 from synfeal.evaluation import bootstrap
 from synfeal.geometry import poses, rotations
 from synfeal.planning import path
+from tests.hard_cases import estimates, scenes
+from tests.hard_cases.values import REFUSED, Values, error_of, stored_values
 
 FRACTIONS = (0.0, 0.1, 0.5, 1.0)  # how far from one rotation to the other
 REFUSAL = "refusal"  # the quantity of cases without an answer: 0 when refused, else ``inf``
@@ -85,7 +85,7 @@ def error_of_case(family: Family, answer: Answer, stored: Values) -> float:
 
     Returns:
         The largest difference, in the unit of the family; see
-        :func:`~reproduction.hard_cases.values.error_of`.
+        :func:`~tests.hard_cases.values.error_of`.
     """
     try:
         found = answer(stored.inputs)

@@ -1,4 +1,4 @@
-"""Compute the stored reference values of hard cases: ``python -m tests.support.hard_case_values``.
+"""Compute the stored reference values of hard cases: ``python -m tests.hard_cases.truths``.
 
 Truths are computed with 50 digits by mpmath, or in rational numbers, for the very doubles that the
 functions get: a double is a rational number, so nothing is lost in taking it over. Beside them
@@ -22,10 +22,10 @@ from scipy.stats import norm
 
 from baselines.labels.posegraph.graph import PoseGraph
 from baselines.labels.posegraph.levenberg_marquardt import factors_of
-from reproduction.hard_cases import cases, estimates, scenes
-from reproduction.hard_cases.values import FILE, REFUSED, error_of
 from synfeal.geometry import poses
 from synfeal.records.files import write_json
+from tests.hard_cases import cases, estimates, scenes
+from tests.hard_cases.values import FILE, REFUSED, error_of
 
 MP = MPContext()  # a context of its own: nobody else's precision is touched
 MP.dps = 50
@@ -42,7 +42,7 @@ BREAKDOWNS = (ArithmeticError, ValueError, RuntimeError, IndexError, np.linalg.L
 
 
 def computed():
-    """All values, by family and case, as :mod:`reproduction.hard_cases.values` describes them."""
+    """All values, by family and case, as :mod:`tests.hard_cases.values` describes them."""
     found = {}
     for key, case in reference_cases().items():
         family = next(f for f in cases.CASES if f.name == key[0] and key[1] in f.cases)
