@@ -38,8 +38,25 @@ def _model_of(path: Path) -> Path | None:
     return None
 
 
+def _lacking(path: Path) -> Path | None:
+    """Return the file of cameras that a model lacks which has its images; None without such."""
+    for name in MODELS:
+        folder = path / name
+        if (folder / "images.bin").is_file():
+            return folder / "cameras.bin"
+        if (folder / "images.txt").is_file():
+            try:
+                colmap_images(folder / "images.txt")
+            except InputError:
+                continue  # it is something else that has this name
+            return folder / "cameras.txt"
+    return None
+
+
 def _read(path: Path) -> Capture:
     folder = _model_of(path)
+    if folder is None and (lacking := _lacking(path)) is not None:
+        raise InputError(lacking, "missing, and the images of a COLMAP model are there", "copy it")
     if folder is None:
         raise InputError(path, "holds no cameras and images, .bin or .txt, of a COLMAP model")
     is_binary = all((folder / f"{kind}.bin").is_file() for kind in ("cameras", "images"))
@@ -154,6 +171,6 @@ FORMAT = CaptureFormat(
     title="COLMAP",
     marks="cameras.bin or cameras.txt in it, in sparse/0 or in model",
     source="COLMAP's documentation, Output format",
-    is_at=lambda path: path.is_dir() and _model_of(path) is not None,
+    is_at=lambda path: path.is_dir() and (_model_of(path) or _lacking(path)) is not None,
     read=_read,
 )

@@ -1,5 +1,6 @@
 """Nothing blank in silence: what would show nothing is refused or said before it is rendered."""
 
+import dataclasses
 import json
 import logging
 import re
@@ -8,7 +9,9 @@ import pytest
 import trimesh
 
 from synfeal.cli import main
+from synfeal.collection.run import refuse_invisible
 from synfeal.config.dataset import CameraConfig
+from synfeal.errors import InputError
 from synfeal.mesh.save import save_glb
 from tests.support.collected import painted, refused
 
@@ -47,6 +50,15 @@ def obj_without_its_mtl(folder):
     lines += ["usemtl one", *faces[:half], "usemtl two", *faces[half:]]
     (folder / "room.obj").write_text("\n".join(lines) + "\n")
     return folder / "room.obj"
+
+
+@pytest.mark.parametrize("rgb", [(0, 255, 0), (1, 0, 1)])
+def test_one_colour_is_named_with_what_was_left_out_on_reading(rgb):
+    found = ("part 'front': nowhere opaque enough to be seen; left out",)
+    mesh = dataclasses.replace(painted(box_room(), rgb), findings=found)
+    shown = " ".join(map(str, rgb))
+    with pytest.raises(InputError, match=rf"{shown} of 255.*on reading: part 'front': nowhere"):
+        refuse_invisible(mesh, CAMERA, "sheets.glb")
 
 
 @pytest.mark.parametrize(

@@ -315,6 +315,7 @@ IMAGE_LINES = "1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 1 0 0 1 b.png\n\n"
         (CAMERA_LINE, IMAGE_LINES.replace("2 1 0", "2 x 0"), "line 3 is no image"),
         (b"\1" + bytes(7) + b"\1", b"\1" + bytes(7) + b"\1", "it is too short for 1 images"),
         (b"", b"", "cannot be read as a COLMAP model"),
+        (None, IMAGE_LINES, "cameras.txt: missing, and the images of a COLMAP model are there"),
     ],
 )
 def test_a_damaged_model_of_colmap_is_told_in_our_words(cameras, images, words, tmp_path):
@@ -324,6 +325,8 @@ def test_a_damaged_model_of_colmap_is_told_in_our_words(cameras, images, words, 
         (tmp_path / "images").mkdir(exist_ok=True)
         Image.new("RGB", (40, 30)).save(tmp_path / f"images/{name}.png")
     for kind, content in (("cameras", cameras), ("images", images)):
+        if content is None:
+            continue
         data = content if isinstance(content, bytes) else content.encode()
         (tmp_path / f"{kind}.{end}").write_bytes(data)
     with pytest.raises(InputError) as refusal:
