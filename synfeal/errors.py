@@ -95,7 +95,8 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
             return BROKEN_PIPE
         if error.strerror is None:  # of no system call: a defect
             raise
-        place = f"{error.filename}: " if error.filename else ""
+        name = file_of(error)
+        place = f"{name}: " if name else ""
         print(f"error: {InputError(f'{place}{error.strerror}; {if_interrupted}')}", file=sys.stderr)
         return 1
     except MemoryError as error:
@@ -109,6 +110,14 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
         print(f"error: {what}; {str(interrupt) or if_interrupted}", file=sys.stderr)
         return status
     return 0
+
+
+def file_of(error: OSError) -> Any:
+    """Return the file that an error of the system is about, or None.
+
+    A copy that finds the disk full names its source first, which is all right.
+    """
+    return error.filename if error.filename2 is None else error.filename2
 
 
 @contextmanager

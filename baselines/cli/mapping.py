@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from baselines.cli.training import TURNED_TEXT
@@ -59,7 +60,7 @@ def map(arguments: argparse.Namespace) -> None:  # noqa: A001 (the name of the c
 
     made = build(**keywords(arguments, map))
     print(f"{arguments.out}: {describe_map(made)}, {made.record['seconds']:.0f} s")
-    print(f"synfeal localize {arguments.out} photos/ --out poses.csv")
+    print(f"synfeal localize {quote(str(arguments.out))} photos/ --out poses.csv")
 
 
 MAP_OPTIONS = (

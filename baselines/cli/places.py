@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 
 from synfeal.cli.options import command, keywords, option
 
@@ -61,4 +62,4 @@ def build(arguments: argparse.Namespace) -> None:
             f" {learned['orientation_deg']:.2f} degrees on held-out renderings (medians)"
         )
     print(f"{Place(arguments.out).report}: look at it")
-    print(f"synfeal localize {arguments.out} photos/ --out poses.csv")
+    print(f"synfeal localize {quote(str(arguments.out))} photos/ --out poses.csv")

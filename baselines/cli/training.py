@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from baselines.config.learning import MODELS
@@ -133,7 +134,7 @@ def train(arguments: argparse.Namespace) -> None:
         raise KeyboardInterrupt("run the same command again to go on") from interrupt
     warn_of_ignorance(done.unseen)
     print(trained_text(done))
-    print(f"synfeal localize {done.model} photos/ --out poses.csv")
+    print(f"synfeal localize {quote(str(done.model))} photos/ --out poses.csv")
 
 
 def trained_text(done: TrainedModel) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -20,7 +19,8 @@ from baselines.references.confidence import LEAST_CONFIDENCE
 from baselines.references.mapped import StructureMap, read_map
 from baselines.references.photographs import Answer, Finder
 from baselines.references.redrawn import Redrawn, read_redrawn
-from baselines.training.localize import find_pictures, open_picture
+from baselines.training.localize import open_picture
+from baselines.training.pictures import check_out, find_pictures, refuse_mixed_sizes
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.dataset.pose_table import COLUMNS, IMAGE, SUPPORT
 from synfeal.errors import Argument, InputError
@@ -107,7 +107,8 @@ def localize_in_map(
         )
     place = read_map(folder)
     pictures = find_pictures(named)
-    _check_out(out, pictures)
+    check_out(out, pictures)
+    refuse_mixed_sizes(camera, pictures)
     torch.set_num_threads(1)
     taken_s: list[float] = []
     turned: list[Path] = []
@@ -186,24 +187,6 @@ def _find(
     if redrawn is None or refused:
         return answer
     return redrawn.refine(photograph, answer)
-
-
-def _check_out(out: Path, pictures: Sequence[Path]) -> None:
-    """Refuse to overwrite anything but poses of an earlier command."""
-    if out.is_dir():
-        raise InputError(out, "is a directory", "name a file with `out`")
-    if not os.path.lexists(out):
-        return
-    if out.exists() and any(path.exists() and out.samefile(path) for path in pictures):
-        raise InputError(out, "is one of the inputs", "choose another file with `out`")
-    begins = f"{IMAGE},{','.join(COLUMNS[2:])}".encode()
-    try:
-        with out.open("rb") as file:
-            holds_poses = file.readline(200).startswith(begins)
-    except OSError:
-        holds_poses = False
-    if not holds_poses:
-        raise InputError(out, "exists and holds no poses", "choose another file with `out`")
 
 
 def _write(

@@ -47,6 +47,7 @@ from synfeal.records.files import (
     read_json,
     refuse_existing,
     refuse_inside,
+    refuse_unwritable,
     write_json,
     writing_to,
 )
@@ -153,6 +154,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
     """
     refuse_existing(out)
     refuse_inside(out, frames.source)
+    refuse_unwritable(out)
     if frames.has_depth:
         check_depth(frames.posed_depth)
     began = time.perf_counter()

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import logging
-import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 from typing import Literal, NamedTuple
@@ -19,6 +18,7 @@ from torch import Tensor
 
 from baselines.training.checkpoint import ModelDescription, TrainedLocalizer, read_checkpoint
 from baselines.training.device import open_device
+from baselines.training.pictures import check_out, find_pictures, refuse_mixed_sizes
 from baselines.training.predict import BATCH, DECIMALS, median_ms
 from baselines.training.resample import Resampler, same_view
 from baselines.training.typicality import OUTSIDE, features_of, typicality
@@ -26,7 +26,7 @@ from baselines.training.virtual_views import VirtualViews
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.orientation import Orientation, Upright, upright
 from synfeal.camera.photograph import PhotographCamera, Source
-from synfeal.dataset.images import HEIF, HEIF_REMEDY, HEIF_SUFFIXES, read_image, reads_heif
+from synfeal.dataset.images import HEIF, read_image
 from synfeal.dataset.packed import NetworkView, fit_frame
 from synfeal.dataset.pose_table import COLUMNS, SEEN
 from synfeal.errors import Argument, InputError
@@ -47,8 +47,6 @@ MOST_PIXELS = 2**27  # more than any camera takes
 log = logging.getLogger(__name__)
 
 HEADER = ("image", *COLUMNS[2:], *SEEN)
-# What an earlier version wrote, which may be written over too.
-EARLIER_HEADER = HEADER[: -len(SEEN)]
 
 
 class Localized(NamedTuple):
@@ -123,7 +121,8 @@ def localize(
         raise InputError(Argument("turns"), f"must be 0 to {MOST_TURNS}, found {turns}")
     reader = PictureReader(trained.description, camera or PhotographCamera(exif=False), model)
     pictures = find_pictures(named)
-    _check_out(out, [model, *pictures])
+    check_out(out, [model, *pictures])
+    refuse_mixed_sizes(reader.camera, pictures)
     views = VirtualViews(trained, turns)
     first = _batch(trained, pictures[:1], reader)
     network_ms = median_ms(lambda: views.predict(first))
@@ -265,25 +264,6 @@ def _batch(trained: TrainedLocalizer, pictures: Sequence[Path], reader: PictureR
     return torch.from_numpy(frames).to(trained.device).permute(0, 3, 1, 2)
 
 
-def _check_out(out: Path, inputs: Sequence[Path]) -> None:
-    if out.is_dir():
-        raise InputError(out, "is a directory", "name a file with `out`")
-    if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
-        raise InputError(out, "is one of the inputs", "choose another file with `out`")
-    if os.path.lexists(out) and not _holds_poses(out):
-        raise InputError(out, "exists and holds no poses", "choose another file with `out`")
-
-
-def _holds_poses(out: Path) -> bool:
-    """Check that an earlier command wrote a file."""
-    try:
-        with out.open("rb") as file:
-            found = file.readline(200).strip().decode(errors="replace")
-            return found in (",".join(HEADER), ",".join(EARLIER_HEADER))
-    except OSError:
-        return False
-
-
 def _write(
     out: Path, pictures: Sequence[Path], poses: Array, good: NDArray[np.bool_], seen: Familiarity
 ) -> None:
@@ -296,7 +276,7 @@ def _write(
         good: Poses (N,) that are finite.
         seen: Their distance from what the model has seen.
     """
-    frame = pd.DataFrame(poses, columns=list(EARLIER_HEADER[1:]))
+    frame = pd.DataFrame(poses, columns=list(COLUMNS[2:]))
     frame.insert(0, HEADER[0], pd.Series([str(path) for path in pictures], dtype=object))
     further = seen.status(good), seen.typicality, seen.outside_m
     frame = frame.assign(**dict(zip(SEEN, further, strict=True)))
@@ -304,28 +284,11 @@ def _write(
         write_frame(out, frame, float_format=None, na_rep="nan")
 
 
-SUFFIXES = (".png", ".jpg", ".jpeg", *HEIF_SUFFIXES)
 FORMATS = ("PNG", "JPEG", HEIF)
 # Modes of eight bits or fewer per channel; what else there is has no scale that is known.
 LEAVE_OUT = "; leave it out or repair it"
 # A longer picture has no square with as much to see as a training frame has.
 MAX_ASPECT = 20
-
-
-def find_pictures(named: Iterable[Path]) -> list[Path]:
-    """List the files named and, in place of a directory, the pictures in it, sorted by name.
-
-    Of a 7-Scenes sequence these are the colour images: ``*.depth.png`` is left out.
-
-    Raises:
-        InputError: something named is not there, or a directory holds no picture.
-    """
-    found: list[Path] = []
-    for path in named:
-        if not (path.is_dir() or path.is_file()):
-            raise InputError(path, "there is no such picture or directory")
-        found += _in(path) if path.is_dir() else [path]
-    return found
 
 
 def read_picture(path: Path, input_px: int, view: NetworkView = "square") -> NDArray[np.uint8]:
@@ -387,7 +350,7 @@ class PictureReader:
         self, description: ModelDescription, camera: PhotographCamera, model: Path
     ) -> None:
         self._network, self._target = description.network, description.camera
-        self._camera = camera
+        self.camera = camera
         self.source = camera.source
         if self._target is None and camera.source in ("file", "focal"):
             raise InputError(
@@ -412,11 +375,11 @@ class PictureReader:
 
     def _brought(self, image: Image.Image, turn: Orientation, path: Path) -> Image.Image:
         """Resample the picture to the training camera, where both cameras are known."""
-        known = None if self._target is None else self._camera.of(image, path, turn)
+        known = None if self._target is None else self.camera.of(image, path, turn)
         if known is None or self._target is None:
             return image
         self.resampled.add(path)
-        if self._camera.turns_with(image, turn):
+        if self.camera.turns_with(image, turn):
             self.turned.add(path)
         if known not in self._resamplers:
             same = same_view(known, self._target)
@@ -426,28 +389,3 @@ class PictureReader:
             return image
         self.outside = max(self.outside, resampler.outside)
         return resampler(image)
-
-
-def _in(directory: Path) -> list[Path]:
-    try:
-        files = sorted(path for path in directory.iterdir() if path.is_file())
-    except OSError as error:
-        raise InputError(directory, f"cannot be listed ({error.strerror})") from error
-    if any(directory.glob("seq-[0-9]*")):
-        raise InputError(directory, "is a data set", f"name its sequences, {directory}/seq-01")
-    found = [path for path in files if _is_picture(path.name.lower())]
-    heif = [path for path in found if path.suffix.lower() in HEIF_SUFFIXES]
-    if heif and not reads_heif():
-        which = f"{len(heif)} of {len(found)} photographs are HEIC ({heif[0].name}, ...)"
-        if len(heif) == len(found):
-            raise InputError(directory, f"{which}, which needs pillow-heif: {HEIF_REMEDY}")
-        log.warning("%s: %s and left out: %s", directory, which, HEIF_REMEDY)
-        found = [path for path in found if path not in heif]
-    if not found:
-        raise InputError(directory, f"holds no {', '.join(SUFFIXES)}", "name another directory")
-    return found
-
-
-def _is_picture(name: str) -> bool:
-    hidden_or_depth = name.startswith(".") or name.endswith(".depth.png")
-    return name.endswith(SUFFIXES) and not hidden_or_depth

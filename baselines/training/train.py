@@ -39,6 +39,7 @@ from baselines.training.own_frames import (
     read_own_frames,
     read_test_frames,
 )
+from baselines.training.pictures import refuse_mixed_sizes
 from baselines.training.run import Job, step_seconds, train_localizer
 from baselines.training.selection import HeldOutErrors, kept_errors
 from baselines.training.unseen import MOST_TEST_FRAMES, score_held_out, score_test_split
@@ -47,6 +48,7 @@ from synfeal.config.photometric import PhotometricConfig
 from synfeal.errors import Argument, InputError, wording
 from synfeal.records.files import read_json, refuse_foreign, refuse_inside, write_json, writing_to
 from synfeal.records.lock import only_command
+from synfeal.records.progress import at_work
 from synfeal.records.provenance import provenance
 
 log = logging.getLogger(__name__)
@@ -189,12 +191,15 @@ def train(job: TrainJob) -> TrainedModel:
     device = open_device(job.device)
     network = _network(job, device)
     settings = _settings(job, network)
-    sets = Sets.read(job)
-    hashes = sets.sha256()
+    with at_work("train", "reading the data sets"):
+        sets = Sets.read(job)
+        hashes = sets.sha256()
     if (job.out / RECORD).exists():
         return _finished(job, settings, hashes)
     _refuse_useless(job, sets.learned)
     _refuse_what_does_not_fit(job, network, sum(len(own.color) for own in sets.learned), device)
+    photographs = [own for own in (*sets.learned, *sets.test) if own.camera is None]
+    refuse_mixed_sizes(job.photographs, (file for own in photographs for file in own.color))
     for own in sets.learned:
         check_posed_depth(own, job.photographs)
     is_new = not job.out.exists()
@@ -208,7 +213,7 @@ def train(job: TrainJob) -> TrainedModel:
                 run = _job_of(job, network, packed)
                 return _trained(job, run, sets, packed, {"settings": settings, "sha256": hashes})
     except InputError:
-        if is_new and not any(job.out.iterdir()):
+        if is_new and job.out.is_dir() and not any(job.out.iterdir()):
             job.out.rmdir()
         raise
 

@@ -43,8 +43,14 @@ def profile_path(name: str) -> Path:
     if name.endswith((".yaml", ".yml")):
         return Path(name)
     paths = sorted(FOLDER.glob("*.yaml"))
+    if not paths:
+        raise InputError(
+            f"profile '{name}'",
+            f"there is no folder {FOLDER}/ with profiles here",
+            "go to a clone of the repository, or name a YAML file",
+        )
     found = {str(read_yaml(path).get("profile", path.stem)): path for path in paths}
     if name not in found:
-        known = ", ".join(sorted(found)) or "none"
+        known = ", ".join(sorted(found))
         raise InputError(f"profile '{name}'", f"no such profile in {FOLDER}/; known: {known}")
     return found[name]

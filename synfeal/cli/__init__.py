@@ -28,4 +28,4 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         sys.stdout.flush()
 
-    return exit_status(act, "nothing was kept")
+    return exit_status(act, "what was not finished was not kept")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 from pathlib import Path
+from shlex import quote
 
 from synfeal.cli.options import command, keywords, option
 
@@ -43,4 +44,4 @@ def unpack(arguments: argparse.Namespace) -> None:
     of_depth = "no depth" if depth is None else f"depth {depth.width} x {depth.height}"
     print(f"{arguments.out}: {len(done.names)} frames, {size}, {of_depth}")
     if depth is not None:
-        print(f"synfeal scan {arguments.out} --out scan.glb")
+        print(f"synfeal scan {quote(str(arguments.out))} --out scan.glb")

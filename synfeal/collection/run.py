@@ -44,7 +44,7 @@ from synfeal.mesh.triangles import load_collision_mesh, merge_vertices
 from synfeal.planning.coverage import empty_pixels, scene_coverage
 from synfeal.planning.plan import plan_mesh
 from synfeal.records.files import file_sha256, write_json
-from synfeal.records.progress import Progress
+from synfeal.records.progress import Progress, at_work
 from synfeal.records.provenance import generator_of
 from synfeal.render.surface import Layers
 
@@ -245,9 +245,12 @@ def collect(config: CollectConfig, out: Path, cores: int = 1) -> None:
         if part is None:
             return
         scene = part / WORK / "scene"
-        _prepare(job, scene)
-        plans = _plan(job, scene, part)
-        detail = _choose_detail(job.config, scene, part)
+        with at_work("collect", "preparing the mesh"):
+            _prepare(job, scene)
+        with at_work("collect", "planning paths"):
+            plans = _plan(job, scene, part)
+        with at_work("collect", "choosing the mesh to draw"):
+            detail = _choose_detail(job.config, scene, part)
         _render(job.config, plans, scene / "mesh.glb", detail, part, cores)
         if job.sequence_from_world is not None:
             write_sequence_from_world(part, job.sequence_from_world)

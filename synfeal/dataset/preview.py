@@ -19,7 +19,7 @@ from synfeal.dataset.sequence_listing import SequenceListing
 from synfeal.dataset.sevenscenes import Split
 from synfeal.dataset.split_frames import read_split_frames
 from synfeal.errors import Argument, InputError
-from synfeal.records.files import atomic_path, lies_in
+from synfeal.records.files import atomic_path, lies_in, refuse_unwritable
 
 TILE_WIDTH_PX, TITLE_PX = 320, 16
 
@@ -60,6 +60,9 @@ def write_preview(
         raise InputError(
             Argument("out"), f"{out}: a preview is a GIF or MP4", "end its name in .gif or .mp4"
         )
+    if out.exists():
+        raise InputError(out, "exists", "delete it or choose another file with `out`")
+    refuse_unwritable(out)
     if write is _write_mp4:
         encoder()  # missing, it is to be missed before any frame is read
     columns = []

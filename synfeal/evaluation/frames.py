@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from collections.abc import Sequence
@@ -37,6 +38,7 @@ Array = NDArray[np.float64]
 NAME = re.compile(r"(?:seq-?(\d+)[/_-])?frame-(\d{6,})(?:\D|$)")
 TIME_SLACK = 0.25  # of a frame
 
+log = logging.getLogger("synfeal")
 Key = tuple[str, int]  # sequence and number of a frame
 
 
@@ -96,6 +98,7 @@ def read_scored_frames(dataset: Path, split: str) -> ScoredFrames:
     if _is_unsplit(dataset):
         return _unsplit_photographs(dataset)
     everything = list_sequences(dataset)
+    split = _split_with_frames(dataset, split, everything)
     sequences = _of_split(dataset, split, everything)
     refuse_problems(sequences)
     _check_tables(dataset, split, everything)
@@ -153,6 +156,20 @@ def _frame_named(dataset: Path, name: str) -> Frame:
     return Frame(where, int(frame.removeprefix("frame-")))
 
 
+def _split_with_frames(dataset: Path, split: str, sequences: list[SequenceListing]) -> str:
+    """Return the split to score: of a data set with training frames alone, that.
+
+    So are photographs that were rendered again at their poses (``mode="repeat"``).
+    """
+    if split != "test":
+        return split
+    splits, failures = read_splits(dataset, sequences)
+    if failures or splits.get("test") or not splits.get("train"):
+        return split
+    log.warning("%s: has no test frames, so its training frames are scored", dataset)
+    return "train"
+
+
 def _of_split(
     dataset: Path, split: str, sequences: list[SequenceListing]
 ) -> Sequence[SequenceListing]:
@@ -205,10 +222,11 @@ def match(
             of the scored frames has one.
     """
     keys = _keys(frames, estimates, path, rate_hz)
+    _tell_foreign(keys, estimates, path)
     index = {(f.sequence.stem, f.number): i for i, f in enumerate(frames.frames)}
     row = np.full(len(index), -1, dtype=np.int64)
     for estimate, key in enumerate(keys):
-        frame = index.get(key)
+        frame = None if key is None else index.get(key)
         if frame is None:
             continue
         if row[frame] >= 0:
@@ -227,8 +245,22 @@ def match(
     return row
 
 
-def _keys(frames: ScoredFrames, estimates: PoseList, path: Path, rate_hz: float) -> list[Key]:
-    """Return sequence and number of each estimate's frame."""
+def _tell_foreign(keys: Sequence[Key | None], estimates: PoseList, path: Path) -> None:
+    """Mention names that are of no frame, or refuse them where there are no others."""
+    foreign = [row for row, key in enumerate(keys) if key is None]
+    if not foreign:
+        return
+    name, place = estimates.names[foreign[0]], estimates.places[foreign[0]]
+    problem = f"'{name[:80]}' names no frame; names hold seq-01/frame-000000"
+    if len(foreign) == len(keys):
+        raise InputError(f"{path}: {place}", problem)
+    log.warning("%s: %s: %s; %d such poses are left out", path, place, problem, len(foreign))
+
+
+def _keys(
+    frames: ScoredFrames, estimates: PoseList, path: Path, rate_hz: float
+) -> list[Key] | list[Key | None]:
+    """Return sequence and number of each estimate's frame; None where a name is of none."""
     pairs = list(zip(estimates.names, estimates.places, strict=True))
     if estimates.frame_key == "index":
         keys = [_by_index(frames, name, f"{path}: {place}") for name, place in pairs]
@@ -275,10 +307,10 @@ def _by_index(frames: ScoredFrames, name: str, where: str) -> Key:
     return frame.sequence.stem, frame.number
 
 
-def _by_name(name: str, stems: Sequence[str], where: str, _: float) -> Key:
+def _by_name(name: str, stems: Sequence[str], where: str, _: float) -> Key | None:
     found = list(NAME.finditer(name.replace("\\", "/")))
     if not found:
-        raise InputError(where, f"'{name[:80]}' names no frame; names hold seq-01/frame-000000")
+        return None
     sequence, number = found[-1].groups()
     if sequence is None and len(stems) > 1:
         raise InputError(

@@ -135,6 +135,8 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
             errors[f"dcre{end}"] = dcre(answers, truth, depth_m, camera)
     rotations = np.asarray(np.isfinite(predicted).all(axis=(1, 2)))
     if not rotations.any():
+        if not (row >= 0).any() or np.isnan(estimates.translation[row[row >= 0]]).all():
+            raise InputError(poses, "holds no pose of these frames, none of them was localized")
         raise InputError(poses, "none of its poses is a rotation and a position")
     metrics = _metrics(errors, yardsticks, frames)
     return Evaluation(frames, estimates, convention, row, rotations, errors, metrics, scales)

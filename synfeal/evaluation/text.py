@@ -83,7 +83,9 @@ def report_text(poses: Path, settings: Settings, found: Evaluation) -> str:
 
 
 def _findings(poses: Path, settings: Settings, found: Evaluation) -> list[str]:
-    n_frames, there = len(found.frames.names), found.row >= 0
+    n_frames, named = len(found.frames.names), found.row >= 0
+    # Of a photograph that is not localized, a file holds a row and no pose.
+    there = named & np.isfinite(found.estimates.translation[found.row]).all(axis=1)
     lines = [
         f"{poses}: {found.estimates.kind}, {len(found.estimates.names)} poses, taken as"
         f" {found.convention.direction} with quaternions {found.convention.order}"
@@ -99,7 +101,7 @@ def _findings(poses: Path, settings: Settings, found: Evaluation) -> list[str]:
     names = np.array(found.frames.names)
     lines += _some("without a pose, which counts as a failure", names[~there])
     lines += _some("no rotation, which counts likewise", names[there & ~found.rotations])
-    if foreign := len(found.estimates.names) - int(there.sum()):
+    if foreign := len(found.estimates.names) - int(named.sum()):
         lines.append(f"{foreign} poses of other frames are left out")
     if settings.align != "none":
         scale = f", scale {found.scales['']:.6g}" if settings.align == "sim3" else ""

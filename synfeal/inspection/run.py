@@ -17,16 +17,18 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from synfeal.config.collection import SceneConfig
-from synfeal.config.dataset import CameraConfig
+from synfeal.config.dataset import CameraConfig, RenderConfig, Shade
 from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.inspection.doubts import Inspection
 from synfeal.inspection.facts import facts_of
 from synfeal.inspection.surface import ACROSS_RAD, viewer_mesh
 from synfeal.inspection.text import Facts, how_to_go_on, page_html, plain_text, sections_of
+from synfeal.mesh.ambient import with_ambient_light
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.records.files import atomic_path, refuse_foreign, write_json
+from synfeal.records.files import atomic_path, refuse_foreign, refuse_unwritable, write_json
+from synfeal.records.progress import at_work
 from synfeal.render import open_renderer
 
 Array = NDArray[np.float64]
@@ -74,10 +76,13 @@ def inspect_mesh(
         InputError: The mesh cannot be used, the box misses it, or ``out`` holds other files.
     """
     refuse_foreign(out, OUTPUTS, "an inspection")
-    found = Inspection.of(scene, unit_is_given or scene.sampling_box is not None)
-    facts = facts_of(found)
+    refuse_unwritable(out / OUTPUTS[0])
+    with at_work("inspect", "looking for free space and trying cameras there"):
+        found = Inspection.of(scene, unit_is_given or scene.sampling_box is not None)
+        facts = facts_of(found)
     facts["doubts"] = [wording(doubt) for doubt in facts["doubts"]]
-    picture = picture_png(facts, found)
+    with at_work("inspect", "drawing"):
+        picture = picture_png(facts, found)
     edges = [edge for box_m in found.suggested_m for edge in box_lines(box_m)]
     heading = heading_from_opening(found.caster, found.viewpoint_m)
     drawing = viewer_mesh(found.mesh, found.surface).scene(
@@ -133,7 +138,8 @@ def picture_png(facts: Facts, found: Inspection) -> bytes:
     text = partial(figure.text, va="center", parse_math=False)
     text(0.02, 0.96, facts["title"], fontsize=17, weight="bold")
     text(0.02, 0.92, caption, fontsize=11, color="0.35")
-    views = inside_views(found.mesh, position_m)
+    shade = None if found.suggestion is None else found.suggestion.shade
+    views = inside_views(found.mesh, position_m, shade)
     _draw_top(figure, top_view(found.mesh, cut_m), cut_m, boxes_m, position_m)
     for index, (yaw, view) in enumerate(zip(LOOKS_ALONG, views, strict=True)):
         left, bottom = 0.45 + 0.272 * (index % 2), 0.50 - 0.43 * (index // 2)
@@ -142,7 +148,8 @@ def picture_png(facts: Facts, found: Inspection) -> bytes:
         axes.set_axis_off()
         axes.set_title(f"yaw {yaw}°: along {LOOKS_ALONG[yaw]}", fontsize=11, loc="left", pad=4)
     place = ", ".join(f"{value:.2f}" for value in position_m)
-    said = f"Views from ({place}) m, 75° wide, as a camera will see them."
+    light = "" if shade is None else f", lit by the {shade} light of the command"
+    said = f"Views from ({place}) m, 75° wide, as a camera will see them{light}."
     figure.text(0.45, 0.03, said, fontsize=10, color="0.35")
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
@@ -199,9 +206,10 @@ class TopView(NamedTuple):
     extent_m: tuple[float, float, float, float]
 
 
-def inside_views(mesh: TexturedMesh, position_m: Array) -> list[Rgb]:
-    """Draw what a level camera at (3,) sees at each of ``LOOKS_ALONG``."""
-    with open_renderer(mesh, VIEW_CAMERA) as renderer:
+def inside_views(mesh: TexturedMesh, position_m: Array, shade: Shade | None) -> list[Rgb]:
+    """Draw what a level camera at (3,) sees at each of ``LOOKS_ALONG``, in the light of frames."""
+    shown = with_ambient_light(mesh) if shade == "ambient" else mesh
+    with open_renderer(shown, VIEW_CAMERA, RenderConfig(shade=shade)) as renderer:
         turns = rotation_from_rpy([[0.0, 0.0, math.radians(yaw)] for yaw in LOOKS_ALONG])
         return [renderer.render(pose_matrix(turn, position_m)) for turn in turns]
 

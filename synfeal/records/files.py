@@ -19,7 +19,7 @@ from typing import Any
 
 import yaml
 
-from synfeal.errors import Argument, InputError
+from synfeal.errors import Argument, InputError, file_of
 
 # Names of what is being written begin so, then say by which process: nobody else's files do.
 UNFINISHED = ".synfeal-unfinished"
@@ -247,7 +247,7 @@ def writing_to(path: Path, remedy: Callable[[], str]) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        name, reason = error.filename or path, error.strerror or str(error)
+        name, reason = file_of(error) or path, error.strerror or str(error)
         raise InputError(name, reason, remedy()) from error
 
 
@@ -300,6 +300,18 @@ class PlainLoader(yaml.SafeLoader):
             raise yaml.composer.ComposerError(None, None, "aliases (*name) are not read", mark)
         return super().compose_node(parent, index)
 
+    def construct_yaml_int(self, node: Any) -> int:
+        """Construct a whole number; refuse what YAML 1.1 alone takes for octal or base 60."""
+        text = str(self.construct_scalar(node)).lstrip("+-")
+        if ":" in text or (len(text) > 1 and text[0] == "0" and text[1] in "01234567_"):
+            raise yaml.constructor.ConstructorError(
+                None,
+                None,
+                f"'{text}' would be read as another number; write it without a 0 or ':' in front",
+                node.start_mark,
+            )
+        return super().construct_yaml_int(node)  # type: ignore[no-untyped-call]
+
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
         """Construct a mapping; refuse a key that occurs twice."""
         keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
@@ -309,3 +321,6 @@ class PlainLoader(yaml.SafeLoader):
                     None, None, f"the key '{key}' is there twice", node.start_mark
                 )
         return super().construct_mapping(node, deep)
+
+
+PlainLoader.add_constructor("tag:yaml.org,2002:int", PlainLoader.construct_yaml_int)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -130,3 +131,27 @@ class Progress(tqdm):  # type: ignore[type-arg]
             rate = count / seconds if seconds else float("inf")
             line = f"{name}, {count} {self._units} in {seconds:.1f} s, {rate:.1f}/s"
             print(line, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def at_work(name: str, what: str) -> Iterator[None]:
+    """Print now and then that work goes on of which nothing can be counted.
+
+    Args:
+        name: The command, as in lines of :class:`Progress`.
+        what: What it does, such as ``choosing the collision mesh``.
+    """
+    done, began_s = threading.Event(), time.monotonic()
+
+    def tell() -> None:
+        while not done.wait(EVERY_S):
+            seconds = time.monotonic() - began_s
+            print(f"{name}: {what}, {seconds:.0f} s so far", file=sys.stderr, flush=True)
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        done.set()
+        teller.join()

@@ -131,13 +131,37 @@ def fuse(
         raise nothing from error
     if "indices" not in mesh.triangle or not len(mesh.triangle["indices"]):
         raise nothing
-    legacy = mesh.to_legacy()
-    legacy.compute_vertex_normals()
-    return FusedSurface(
-        vertices_m=np.asarray(legacy.vertices, np.float64),
-        normals=np.asarray(legacy.vertex_normals, np.float64),
-        faces=np.asarray(legacy.triangles, np.int64),
+    vertices, faces = ordered(
+        mesh.vertex["positions"].numpy().astype(np.float64),
+        mesh.triangle["indices"].numpy().astype(np.int64),
     )
+    legacy = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(faces.astype(np.int32))
+    )
+    legacy.compute_vertex_normals()
+    return FusedSurface(vertices, np.asarray(legacy.vertex_normals, np.float64), faces)
+
+
+def ordered(vertices_m: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    """Order vertices and faces by where they are.
+
+    Open3D's threads find them in another order each time, on which samples of vertices and sums
+    over faces depend, and with them calibration and colours of a scan.
+
+    Args:
+        vertices_m: Vertices (V, 3).
+        faces: Indices (F, 3) of vertices.
+
+    Returns:
+        The same vertices and faces; each face begins at its first vertex, and turns as before.
+    """
+    order = np.lexsort(vertices_m.T[::-1])
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    turned = rank[faces]
+    first = turned.argmin(axis=1)
+    turned = np.take_along_axis(turned, (first[:, None] + np.arange(3)) % 3, axis=1)
+    return vertices_m[order], turned[np.lexsort(turned.T[::-1])]
 
 
 class Pinhole:

@@ -1,6 +1,7 @@
 """``synfeal localize``: pictures in, poses out, as a person uses it."""
 
 import math
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +14,11 @@ from PIL import Image
 
 from baselines.training.checkpoint import FrameCamera, frame_camera
 from baselines.training.localize import (
-    HEADER,
     PictureReader,
-    find_pictures,
     localize,
     read_picture,
 )
+from baselines.training.pictures import find_pictures, refuse_mixed_sizes
 from baselines.training.predict import predict, predict_poses
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.cli import main
@@ -26,7 +26,7 @@ from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import encode_png
 from synfeal.dataset.packed import pack_frames
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 from synfeal.geometry.poses import pose_from_quat, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.records.files import write_json
@@ -74,6 +74,7 @@ def run(tmp_path_factory):
 def localized(model, out, *images):
     """Rows that the command wrote, the header first."""
     named = [str(path) for path in images]
+    Path(out).unlink(missing_ok=True)
     assert main(["localize", str(model), *named, "--out", str(out), "--device", "cpu"]) == 0
     rows = [row for _, row in read_records(out)]
     return [[*rows[0]], *([*row.values()] for row in rows)]
@@ -118,12 +119,9 @@ BROKEN = {
 @pytest.mark.parametrize("kind", BROKEN)
 def test_one_bad_picture_stops_all_and_leaves_what_there_was(run, tmp_path, capsys, kind):
     out, bad = tmp_path / "poses.csv", tmp_path / f"{kind}.png"
-    earlier = ",".join(HEADER) + "\n"
-    out.write_text(earlier)
     BROKEN[kind](bad)
     before, good = sorted(tmp_path.iterdir()), run / "seq-01/frame-000000.color.png"
     assert f"{bad}: " in refused(capsys, "localize", run / "model.pt", good, bad, "--out", out)
-    assert out.read_text() == earlier
     assert sorted(tmp_path.iterdir()) == before
 
 
@@ -146,6 +144,55 @@ def test_nothing_of_the_input_is_overwritten(run, capsys, out):
     line = refused(capsys, "localize", run / "model.pt", run / "seq-01", "--out", run / out)
     assert f"{run / out}: is " in line
     assert (run / out).stat().st_size == size
+
+
+def test_poses_of_an_earlier_command_are_not_overwritten(run, tmp_path, capsys):
+    picture, out = run / "seq-01/frame-000000.color.png", tmp_path / "poses.csv"
+    localized(run / "model.pt", out, picture)
+    before = out.read_bytes()
+    line = refused(capsys, "localize", run / "model.pt", picture, "--out", out)
+    assert line == f"error: {out}: exists; delete it or choose another file with --out"
+    assert out.read_bytes() == before
+
+
+@pytest.mark.parametrize("out", ["pipe", "notes.txt/poses.csv", "null"])
+def test_a_place_that_takes_no_file_is_refused_before_the_work(run, tmp_path, capsys, out):
+    os.mkfifo(tmp_path / "pipe")  # reading it would wait for ever
+    (tmp_path / "null").symlink_to("/dev/null")
+    (tmp_path / "notes.txt").touch()
+    picture = run / "seq-01/frame-000000.color.png"
+    line = refused(capsys, "localize", run / "model.pt", picture, "--out", tmp_path / out)
+    assert line.startswith(f"error: {tmp_path / out}: ")
+    assert (tmp_path / "null").is_symlink()
+
+
+def test_pictures_that_are_left_out_are_mentioned(tmp_path, caplog):
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "empty").mkdir()
+    names = ("frame-000000.color.png", "b.jpg", "frame-000000.right.color.png", "inner/c.png")
+    layers = ("depth", "normal", "mask", "right.depth")
+    for name in (*names, *(f"frame-000000.{layer}.png" for layer in layers)):
+        Image.new("RGB", (8, 6)).save(tmp_path / name)
+    for name in ("d.webp", "e.WEBP", "f.tiff", "g.bmp", "notes.txt"):
+        (tmp_path / name).touch()
+    assert [path.name for path in find_pictures([tmp_path])] == ["b.jpg", "frame-000000.color.png"]
+    others, right, inner = (record.getMessage() for record in caplog.records)
+    assert "1 .bmp, 1 .tiff, 2 .webp left out" in others
+    assert "1 images of right cameras left out" in right
+    assert "('inner')" in inner
+    (tmp_path / "empty/h.webp").touch()
+    with pytest.raises(InputError, match=r"holds no \.png.*; 1 \.webp left out"):
+        find_pictures([tmp_path / "empty"])
+
+
+def test_one_focal_length_is_of_one_size(tmp_path):
+    for name, size in (("a", (40, 30)), ("b", (30, 40)), ("c", (80, 60))):
+        Image.new("RGB", size).save(tmp_path / f"{name}.png")
+    refuse_mixed_sizes(PhotographCamera(focal_px=30.0), [tmp_path / "a.png", tmp_path / "b.png"])
+    refuse_mixed_sizes(PhotographCamera(), [tmp_path / "a.png", tmp_path / "c.png"])
+    with pytest.raises(InputError, match=r"40 x 30 pixels, .*c\.png 80 x 60") as raised:
+        refuse_mixed_sizes(PhotographCamera(focal_px=30.0), sorted(tmp_path.glob("*.png")))
+    assert raised.value.where == Argument("focal_px")
 
 
 NAN, ZERO = math.nan, [0.0, 0.0, 0.0, 0.0]
@@ -260,6 +307,7 @@ def folder(tmp_path):
 
 def poses_of(model, folder, *options, status=0):
     out = folder.parent / "poses.csv"
+    out.unlink(missing_ok=True)
     given = ["localize", model, folder, "--out", out, "--device", "cpu", *options]
     assert main([str(value) for value in given]) == status
     return np.array([[*row.values()][1:8] for _, row in read_records(out)], float)

@@ -54,6 +54,7 @@ def localized(place, images, out, *options, map_="map", camera="photo.json"):
     """Rows by column, and poses (N, 4, 4), NaN where there is none."""
     calibration = ["--camera", str(place / camera)] if camera else []
     command = ["localize", str(place / map_), str(images), "--out", str(out)]
+    out.unlink(missing_ok=True)
     assert main([*command, *calibration, *options]) == 0
     with out.open(newline="") as file:
         rows = list(csv.DictReader(file))

@@ -68,6 +68,7 @@ def place(tmp_path_factory):
 def localized(place, photos, out, *options):
     """Rows by column, and poses (N, 4, 4), NaN where there is none."""
     command = ["localize", place / "map", place / photos, "--camera", place / "photo.json"]
+    out.unlink(missing_ok=True)
     assert main([str(word) for word in (*command, "--out", out, *options)]) == 0
     with out.open(newline="") as file:
         rows = list(csv.DictReader(file))

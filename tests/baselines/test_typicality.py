@@ -265,6 +265,7 @@ def pictures(folder, images):
 
 
 def rows_of(model, folder, out):
+    out.unlink(missing_ok=True)
     assert main(["localize", str(model), str(folder), "--out", str(out), "--device", "cpu"]) == 0
     return [row for _, row in read_records(out)]
 

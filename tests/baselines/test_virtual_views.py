@@ -122,6 +122,7 @@ def test_the_command_says_how_many_views(tmp_path, capfd):
     given = ["localize", str(model), str(tmp_path / "a.png"), "--out", str(tmp_path / "p.csv")]
     assert main(given) == 0
     assert " on 17 views" in capfd.readouterr().out
+    (tmp_path / "p.csv").unlink()
     assert main([*given, "--turns", "0"]) == 0
     assert "views" not in capfd.readouterr().out
     assert "--turns" in refused(capfd, *given, "--turns", "-1")

@@ -142,6 +142,8 @@ def test_a_preview_shows_two_sets_side_by_side(damaged, tmp_path, monkeypatch, c
         assert (picture.n_frames, picture.width) == (9, 640)
     film = tmp_path / "film.mp4"
     assert main([*preview, "--out", str(film)]) == 0
+    assert main([*preview, "--out", str(film)]) == 1  # it is not overwritten
+    assert f"{film}: exists" in capsys.readouterr().err
     decoder = cv2.VideoCapture(str(film))
     shown = [decoder.read()[1] for _ in range(9)]
     assert not decoder.read()[0]

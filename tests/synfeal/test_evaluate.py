@@ -90,9 +90,10 @@ def test_what_is_missing_or_no_rotation_counts_as_an_error_and_is_told(
     printed = capsys.readouterr().out
     for words in (
         "an hloc result file, 23 poses, taken as cam_from_world with quaternions wxyz",
-        "24 frames, 22 of them with a pose",
-        "without a pose, which counts as a failure: seq-02/frame-000010, seq-02/frame-000011\n",
-        "no rotation, which counts likewise: seq-02/frame-000004, seq-02/frame-000005\n",
+        "24 frames, 21 of them with a pose",
+        "without a pose, which counts as a failure: seq-02/frame-000005, seq-02/frame-000010,"
+        " seq-02/frame-000011\n",
+        "no rotation, which counts likewise: seq-02/frame-000004\n",
         "1 poses of other frames are left out",
     ):
         assert words in printed
@@ -104,6 +105,39 @@ def test_what_is_missing_or_no_rotation_counts_as_an_error_and_is_told(
     assert scores["recall_50cm_15deg"] == pytest.approx(ok.mean())
     assert scores["position_m"] == pytest.approx(np.median(errors["position_m"]))
     assert (out / "errors.png").stat().st_size > 10_000
+
+
+def test_a_picture_that_is_no_frame_is_left_out_and_told(dataset, truth, tmp_path, caplog, capsys):
+    poses = foreign.write_localized(tmp_path / "poses.csv", truth)
+    poses.write_text(poses.read_text() + "photos/IMG_2041.jpg,0,0,0,1,0,0,0\n")
+    assert main(["evaluate", str(dataset), str(poses)]) == 0
+    assert "'photos/IMG_2041.jpg' names no frame" in caplog.text
+    printed = capsys.readouterr().out
+    assert "24 frames, 24 of them with a pose" in printed
+    assert "1 poses of other frames are left out" in printed
+
+
+def test_training_frames_are_scored_where_there_are_no_others(truth, tmp_path, caplog):
+    folder = tmp_path / "set"
+    foreign.write_dataset(folder)
+    test, train = folder / "TestSplit.txt", folder / "TrainSplit.txt"
+    train.write_text(test.read_text())
+    test.write_text("")
+    poses = foreign.write_localized(tmp_path / "poses.csv", truth)
+    found = evaluate(folder, poses, Settings())
+    assert found.errors["position_m"].max() == pytest.approx(0.0, abs=1e-9)
+    assert "has no test frames, so its training frames are scored" in caplog.text
+
+
+def test_a_file_of_which_nothing_was_localized_says_so(dataset, truth, tmp_path, capsys):
+    lines = foreign.write_localized(tmp_path / "poses.csv", truth).read_text().splitlines()
+    header, *rows = lines
+    empty = [f"{row.partition(',')[0]},,,,,,,,not localized,0,0" for row in rows]
+    (tmp_path / "poses.csv").write_text(
+        "\n".join([f"{header},status,inliers,confidence", *empty]) + "\n"
+    )
+    line = refused(capsys, "evaluate", dataset, tmp_path / "poses.csv")
+    assert line.endswith("poses.csv: holds no pose of these frames, none of them was localized")
 
 
 def test_labels_are_a_second_yardstick_and_a_swapped_convention_is_noticed(
@@ -151,7 +185,7 @@ BAD_LINES = {
     "decimal commas": (ACE, each(lambda x: re.sub(r"(?<=\d)\.(?=\d)", ",", x)), "is not a number"),
     "empty": (HLOC, lambda _: [], "holds no poses"),
     "no rotation": (HLOC, each(lambda x: f"{x.split()[0]} 0 0 0 0 1 2 3"), "is a rotation and"),
-    "no frame in a name": (HLOC, with_line(2, "cat.jpg 1 0 0 0 1 2 3"), "names no frame"),
+    "no frame in names": (HLOC, each(lambda x: f"cat.jpg {x.split(None, 1)[1]}"), "no frame"),
     "no sequence": (HLOC, each(lambda x: x.partition("/")[2]), "does not say of which sequence"),
     "twice": (HLOC, lambda x: [*x, x[4]], "seq-02/frame-000004 has two poses, line 5 and line 25"),
     "of another data set": (HLOC, each(lambda x: x.replace("seq-0", "seq-4")), "none of its 24"),
@@ -184,7 +218,6 @@ BAD_LINES = {
         "row 4: qw must be a number, found 'one'",
     ),
     "table, too long": (TABLE, lambda x: [*x, "99,0,0,0,0,1,0,0,0"], "frame 99 does not exist"),
-    "localize, no frame": (LOCALIZED, with_line(1, "a.png,0,0,0,1,0,0,0"), "names no frame"),
     "quaternions xyzw": (
         HLOC,
         each(lambda x: " ".join([(c := x.split())[0], *c[2:5], c[1], *c[5:]])),

@@ -56,6 +56,16 @@ def test_megabytes_of_comments_are_not_parsed(tmp_path: Path, reader: str) -> No
         READERS[reader](path)
 
 
+@pytest.mark.parametrize("text", ["02000", "-017", "1:30", "0_7"])
+def test_numbers_that_would_become_others_are_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "noise.yaml"
+    path.write_text(f"full_well_e: {text}\n")
+    with pytest.raises(InputError, match=r"line 1: .* would be read as another number"):
+        read_yaml(path)
+    path.write_text("a: 2000\nb: 0\nc: -7\nd: 0x10\ne: 1_000\n")
+    assert read_yaml(path) == {"a": 2000, "b": 0, "c": -7, "d": 16, "e": 1000}
+
+
 def test_a_member_that_unpacks_to_zeros_is_no_pose(tmp_path: Path) -> None:
     Image.new("RGB", (8, 6)).save(tmp_path / "image.png")
     for count, said in ((2**17, "are too many for such a file"), (99, "it holds zero bytes")):

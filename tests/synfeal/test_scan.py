@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
@@ -23,7 +24,7 @@ from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.load import load_mesh
 from synfeal.scanning.camera import CameraOptions
 from synfeal.scanning.cleaning import without_small_pieces
-from synfeal.scanning.fusion import FusedSurface
+from synfeal.scanning.fusion import FusedSurface, ordered
 from synfeal.scanning.gravity import GravityError, find_gravity, likely_up
 from synfeal.scanning.run import ScanJob, scan
 from tests.support.scan_sequence import (
@@ -229,6 +230,20 @@ def test_given_gravity_and_kept_axes(sequence: Path, tmp_path: Path) -> None:
 def surface_of(vertices: Any, faces: Any) -> FusedSurface:
     vertices = np.asarray(vertices, np.float64)
     return FusedSurface(vertices, np.zeros_like(vertices), np.asarray(faces, np.int64))
+
+
+def test_the_order_that_threads_find_a_surface_in_does_not_matter() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    vertices, faces = np.array(ball.vertices), np.array(ball.faces)
+    rng = np.random.default_rng(0)
+    expected = ordered(vertices, faces)
+    assert trimesh.Trimesh(*expected, process=False).volume == pytest.approx(ball.volume)
+    for _ in range(3):
+        order, turns = rng.permutation(len(vertices)), rng.integers(0, 3, len(faces))
+        renamed = np.argsort(order)[faces][rng.permutation(len(faces))]
+        renamed = np.array([np.roll(face, turn) for face, turn in zip(renamed, turns, strict=True)])
+        for found, wanted in zip(ordered(vertices[order], renamed), expected, strict=True):
+            np.testing.assert_array_equal(found, wanted)
 
 
 def test_a_ball_has_no_gravity() -> None:

@@ -3,10 +3,12 @@
 import io
 import subprocess
 import sys
+import time
 
 import pytest
 
 from synfeal.cli import main, parser
+from synfeal.records import progress
 
 LIBRARIES = ("argparse", "numpy", "pydantic", "PIL", "scipy", "yaml", "trimesh")
 
@@ -24,7 +26,7 @@ def test_ctrl_c_while_libraries_are_imported_is_one_line(monkeypatch, capsys):
 
     monkeypatch.setitem(sys.modules, "synfeal.cli.parser", Interrupted())
     assert main(["inspect", "mesh.glb"]) == 130
-    assert capsys.readouterr().err == "error: interrupted; nothing was kept\n"
+    assert capsys.readouterr().err == "error: interrupted; what was not finished was not kept\n"
 
 
 @pytest.mark.parametrize(
@@ -54,3 +56,14 @@ def test_a_reader_that_has_read_enough_is_no_error():
         process.stdout.close()
         said = process.stderr.read()
     assert (process.returncode, said) == (141, b"")
+
+
+def test_work_without_a_count_is_not_silent(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "EVERY_S", 0.01)
+    with progress.at_work("inspect", "drawing"):
+        time.sleep(0.1)
+    first, *_ = capsys.readouterr().err.splitlines()
+    assert first == "inspect: drawing, 0 s so far"
+    with progress.at_work("inspect", "drawing"):
+        pass
+    assert capsys.readouterr().err == ""

@@ -1,5 +1,6 @@
 """What a person reads: refusals in our own words, how far a command is, that it was ended."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -153,6 +154,15 @@ def test_sigterm_says_one_line(tmp_path):
         _, said = process.communicate(timeout=60)
     assert process.returncode == 143
     assert said == "error: terminated; nothing was kept\n"
+
+
+def test_a_full_disk_is_not_blamed_on_what_is_copied(capsys):
+    def copy():
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "source.png", None, "target.png")
+
+    assert exit_status(copy, "nothing was kept") == 1
+    said = capsys.readouterr().err
+    assert said == "error: target.png: No space left on device; nothing was kept\n"
 
 
 def test_sigterm_leaves_handlers_as_they_were():
