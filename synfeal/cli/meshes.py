@@ -93,9 +93,10 @@ def plan(arguments: argparse.Namespace) -> None:
     from synfeal.collection.run import n_paths, plan_training
     from synfeal.collection.settings import collect_config
     from synfeal.dataset.pose_table import write_pose_table
-    from synfeal.records.files import refuse_existing
+    from synfeal.records.files import refuse_existing, refuse_unwritable
 
     refuse_existing(arguments.out)
+    refuse_unwritable(arguments.out)
     config, _ = collect_config(given(arguments, CollectConfig, LikeConfig))
     table = plan_training(config)
     write_pose_table(arguments.out, table)

@@ -27,7 +27,7 @@ from synfeal.inspection.text import Facts, how_to_go_on, page_html, plain_text, 
 from synfeal.mesh.ambient import with_ambient_light
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.rays import RayCaster
-from synfeal.records.files import atomic_path, refuse_foreign, refuse_unwritable, write_json
+from synfeal.records.files import atomic_path, refuse_foreign, write_json
 from synfeal.records.progress import at_work
 from synfeal.render import open_renderer
 
@@ -76,7 +76,6 @@ def inspect_mesh(
         InputError: The mesh cannot be used, the box misses it, or ``out`` holds other files.
     """
     refuse_foreign(out, OUTPUTS, "an inspection")
-    refuse_unwritable(out / OUTPUTS[0])
     with at_work("inspect", "looking for free space and trying cameras there"):
         found = Inspection.of(scene, unit_is_given or scene.sampling_box is not None)
         facts = facts_of(found)

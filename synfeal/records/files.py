@@ -221,6 +221,8 @@ def refuse_existing(path: Path) -> None:
 def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
     """Refuse a directory with anything but what an earlier command of the same kind wrote.
 
+    So is one that could not be written.
+
     Args:
         out: Directory to write into, which need not exist.
         own: Names of the files that may be replaced.
@@ -236,6 +238,7 @@ def refuse_foreign(out: Path, own: Collection[str], origin: str) -> None:
             f"holds '{others[0]}', which is not from {origin}",
             "choose another directory with `out`",
         )
+    refuse_unwritable(out / min(own))
 
 
 @contextmanager
@@ -310,7 +313,7 @@ class PlainLoader(yaml.SafeLoader):
                 f"'{text}' would be read as another number; write it without a 0 or ':' in front",
                 node.start_mark,
             )
-        return super().construct_yaml_int(node)  # type: ignore[no-untyped-call]
+        return super().construct_yaml_int(node)
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
         """Construct a mapping; refuse a key that occurs twice."""

@@ -23,7 +23,7 @@ from synfeal.geometry.axes import PosesAre, meant_poses
 from synfeal.geometry.poses import inverse
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
-from synfeal.records.files import file_sha256, write_json
+from synfeal.records.files import file_sha256, refuse_unwritable, write_json
 from synfeal.records.progress import Progress
 from synfeal.scanning.camera import (
     CameraOptions,
@@ -94,6 +94,7 @@ class ScanJob:
             raise InputError(
                 Argument("out"), f"{self.out}: a scan is binary glTF", "end its name in .glb"
             )
+        refuse_unwritable(self.out)
         if self.start < 0 or (self.stop is not None and self.stop <= self.start):
             raise InputError(Argument("range"), f"{self.start} to {self.stop} holds no frame")
         if self.stride < 1:
