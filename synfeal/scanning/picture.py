@@ -21,7 +21,7 @@ from synfeal.scanning.consistency import LUMA, shrunk
 Rgb = NDArray[np.uint8]
 SHRINK = 2
 ROWS = 4  # frames in the picture
-TITLES = ("photograph", "rendering of the scan", "photograph red, rendering cyan", "difference x 2")
+TITLES = ("photograph", "rendering of the scan", "overlaid, red and cyan", "difference x 2")
 # Height of text as a share of a tile's width: pictures of phones are shown much smaller.
 TEXT_SHARE, LEAST_TEXT_PX = 0.045, 10
 
