@@ -190,7 +190,10 @@ def opened_image(
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our bound is lower
-        image = Image.open(file, formats=formats)
+        try:
+            image = Image.open(file, formats=formats)
+        except Image.DecompressionBombError as error:
+            raise ValueError("it claims more pixels than are read; make it smaller") from error
     with image:
         if image.width * image.height > most_pixels:
             raise ValueError(f"{image.width} x {image.height} pixels are too many; make it smaller")

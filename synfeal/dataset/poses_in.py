@@ -145,8 +145,15 @@ def read_pose_list(path: Path, file_format: FormatName | None = None) -> PoseLis
 
 def _rows(text: str) -> Rows:
     """Split lines into columns, numbered from 1, without blank ones and comments."""
-    rows = [(i, line.split()) for i, line in enumerate(text.splitlines(), start=1)]
+    rows = [(i, _cells(line)) for i, line in enumerate(text.splitlines(), start=1)]
     return [(i, row) for i, row in rows if row and not row[0].startswith("#")]
+
+
+def _cells(line: str) -> list[str]:
+    """Split a line into columns, without a comment behind a whole pose."""
+    cells = line.split()
+    marks = (place for place, cell in enumerate(cells) if cell.startswith("#") and place >= 8)
+    return cells[: next(marks, None)]
 
 
 @dataclass(frozen=True)

@@ -67,5 +67,8 @@ def refuse_non_rigid(matrix: Array, where: object) -> None:
     Raises:
         InputError: It is not.
     """
-    if not is_rigid(matrix):
-        raise InputError(where, "is not a rigid pose; its upper left 3x3 must be a rotation")
+    if is_rigid(matrix):
+        return
+    if matrix.shape == (4, 4) and is_rigid(np.vstack([matrix[:3], [0.0, 0.0, 0.0, 1.0]])):
+        raise InputError(where, "is not a rigid pose; its last row must be 0 0 0 1")
+    raise InputError(where, "is not a rigid pose; its upper left 3x3 must be a rotation")
