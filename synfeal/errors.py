@@ -93,7 +93,7 @@ def exit_status(action: Callable[[], object], if_interrupted: str) -> int:
             # Whoever read what is printed has read enough, as ``head`` does.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return BROKEN_PIPE
-        if error.strerror is None:  # of no system call: a defect
+        if error.strerror is None:  # no system call failed: a defect
             raise
         name = file_of(error)
         place = f"{name}: " if name else ""
@@ -216,7 +216,7 @@ def why(error: BaseException) -> str:
 
     Names of Python classes, memory addresses and codecs are left out.
     """
-    inner = getattr(error, "reason", None)  # of a download
+    inner = getattr(error, "reason", None)  # a download has one
     if isinstance(inner, OSError):
         return why(inner)
     if isinstance(error, OSError) and error.strerror:
@@ -232,7 +232,7 @@ def why(error: BaseException) -> str:
     mark = getattr(error, "problem_mark", None)  # of YAML, counted from 0
     line = getattr(error, "lineno", None) if mark is None else mark.line + 1  # JSON's from 1
     said = getattr(error, "problem", None) or getattr(error, "msg", None) or str(error)
-    if hasattr(error, "errors"):  # of pydantic
+    if hasattr(error, "errors"):  # pydantic's
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
         said = f"{key}: {wording(first)}" if key else wording(first)

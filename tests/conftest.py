@@ -1,4 +1,4 @@
-"""What every test module leaves behind as it found it, and data that several of them look at."""
+"""State that every test module leaves as it found it, and data that several of them read."""
 
 import shutil
 import sys

@@ -22,7 +22,7 @@ from synfeal.evaluation.reprojection import read_cell_depth
 
 
 class Scoring(NamedTuple):
-    """What predictions are scored by, and the files with their scores.
+    """Files that predictions are scored against, and those with their scores.
 
     Attributes:
         truth: True poses of the test frames.

@@ -116,7 +116,7 @@ class Fitting:
 
     @cached_property
     def take_step(self) -> TrainingStep:
-        """What learns from one batch, as the device does it best."""
+        """Step that learns from one batch, as the device does it best."""
         return training_step(
             PlainStep(
                 self.localizer,

@@ -37,7 +37,7 @@ class Rules(NamedTuple):
 
     tag: str  # its date, and a letter where a day had several
     commit: str  # that put it into force; empty for the present one
-    digest: str  # of texts and code; empty for those before rules were frozen
+    digest: str  # hash of texts and code; empty for rules from before they were frozen
     change: str  # against the one before
 
 

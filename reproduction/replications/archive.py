@@ -26,11 +26,11 @@ from synfeal.records.tables import write_frame
 ERRORS = "errors.parquet"
 ASSISTANCE, LABEL_ERROR = "assistance.csv", "label_error.csv"
 SECONDS, PROVENANCE = "seconds.csv", "provenance.json"
-EVERY = 3  # of the frames of a test set
+EVERY = 3  # every third test frame is kept
 KEYS = ("scene", "size", "labels", "init", "model", "test_set")
 # Whole millimetres and hundredths of a degree: both below a thousandth of a median error.
 UNITS = {"position_mm": 1000.0, "orientation_cdeg": 100.0}
-FAILED = np.iinfo(np.uint16).max  # of an error: the prediction was no pose, or off by even more
+FAILED = np.iinfo(np.uint16).max  # the prediction was no pose, or off by even more
 OWN = "own"
 # What is judged on a scene's common test set; all else on the set whose labels the method made.
 ON_COMMON = ("table4_size", "table5_from_scratch", "table7_images_shown")

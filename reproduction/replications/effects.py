@@ -32,7 +32,7 @@ from synfeal.evaluation.bootstrap import Array, medians, path_counts
 from synfeal.records.provenance import generator_of
 from synfeal.records.tables import rows_of
 
-RESAMPLES = 1000  # of the test paths: enough for a standard error
+RESAMPLES = 1000  # resamples of the test paths: enough for a standard error
 PAPERS_FIVE = ("posenet", "poselstm", "hourglass", "posenet2resnet", "posenet2")
 RIVALS = ("sfm", "rgbd-toro", "rgbd-g2o")
 TURNED, MOVED, BOTH = "noise-p0-r20", "noise-p0.3-r0", "noise-p0.3-r20"

@@ -25,7 +25,7 @@ class Part(NamedTuple):
 
     name: str
     asked: Asked
-    sign: int  # of the claimed direction
+    sign: int  # sign of the claimed direction
     values: tuple[float, ...]  # logarithms of ratios, one of each replication
     variances: tuple[float, ...]
     printed: float = math.nan  # the same in print, where it can be computed

@@ -231,7 +231,7 @@ def _read(path: Path, truth: PoseTable) -> PoseTable:
     in_document=True,
 )
 class LabelRankingTable(Table):
-    """How labels rank methods, beside how the truth does."""
+    """Ranking of methods by labels, beside that by the truth."""
 
     schema = SCHEMA
     layout = staticmethod(side_layout)

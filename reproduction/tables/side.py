@@ -19,7 +19,7 @@ __all__ = ["SideTable", "Source", "Table", "table_named", "write_side_table"]
 
 
 class Source(NamedTuple):
-    """What a side table is made from.
+    """Inputs of a side table.
 
     Attributes:
         root: Results of the profile, below which lie the files that the table needs.

@@ -90,7 +90,7 @@ class Calibration:
     cy: float  # principal point from the top edge, pixels
     distortion: Distortion  # k1, k2, p1, p2, k3
     projection: Literal["fisheye"] | None = None  # None: perspective
-    fisheye_k: tuple[float, float, float, float] | None = None  # of a fisheye: k1, k2, k3, k4
+    fisheye_k: tuple[float, float, float, float] | None = None  # k1, k2, k3, k4
 
     def __post_init__(self) -> None:
         for name in ("fx", "fy"):

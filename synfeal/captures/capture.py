@@ -135,8 +135,8 @@ def calibration(
     """Build a calibration from numbers of a file.
 
     Args:
-        width: Of the image, pixels.
-        height: Of the image, pixels.
+        width: Width of the image, pixels.
+        height: Height of the image, pixels.
         pinhole: fx, fy, cx, cy in pixels.
         place: Where they stand, for the message.
         centre_of_first_pixel: Where the format puts it: 0 (OpenCV) or 0.5 (COLMAP).

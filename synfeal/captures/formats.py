@@ -111,7 +111,7 @@ def read_capture(path: Path, name: str | None = None) -> Capture:
 
     Args:
         path: Folder or file.
-        name: Of its format; None finds out.
+        name: Name of its format; None finds out.
 
     Raises:
         InputError: It is in no format that is known, or cannot be used as it is.

@@ -128,7 +128,7 @@ def _camera(values: Mapping[str, Any], size: tuple[int, int], place: str) -> Cal
         width, height = int(values.get("w", size[0])), int(values.get("h", size[1]))
         if "fl_x" in values:
             fx = float(values["fl_x"])
-        else:  # of instant-ngp and Blender's synthetic scenes
+        else:  # as instant-ngp and Blender's synthetic scenes have it
             fx = 0.5 * width / math.tan(0.5 * float(values["camera_angle_x"]))
         fy = float(values.get("fl_y", fx))
         cx, cy = float(values.get("cx", width / 2)), float(values.get("cy", height / 2))

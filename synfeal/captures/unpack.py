@@ -51,10 +51,10 @@ class Unpacked:
     Attributes:
         format: Name of the format that the capture has.
         n_captured: Number of frames of the capture.
-        folder: Of ``frame-000000.color.jpg`` and so on, with ``capture.json``.
+        folder: Folder of ``frame-000000.color.jpg`` and so on, with ``capture.json``.
         color: Camera of all photographs.
         depth: Camera of all depth images; None where there are none.
-        names: Of the photographs in the capture, in the order of the frames.
+        names: Names of the photographs in the capture, in the order of the frames.
         notes: What was left out; sentences for a person.
     """
 

@@ -162,7 +162,7 @@ def build_or_load(scene: SceneConfig, seed: int, called: str) -> TexturedMesh:
 
 Array = NDArray[np.float64]
 TRIES = 2000  # places, before a scene is called too full
-DIM = 0.75  # of the built-in cartons beside their pictures: rooms are dimmer than paper
+DIM = 0.75  # brightness of built-in cartons: rooms are dimmer than paper
 
 
 def cluttered(

@@ -48,9 +48,9 @@ from synfeal.records.progress import Progress, at_work
 from synfeal.records.provenance import generator_of
 from synfeal.render.surface import Layers
 
-WARN_ABOVE = 0.1  # of all pixels: more than windows let through
-SEES_MOST = 0.9  # of a view that meets the mesh
-REFUSE_ABOVE = 0.95  # of all pixels: nobody wants a data set of the background
+WARN_ABOVE = 0.1  # share of empty pixels: more than windows let through
+SEES_MOST = 0.9  # share of a view that meets the mesh
+REFUSE_ABOVE = 0.95  # share of empty pixels: nobody wants the background
 
 log = logging.getLogger("synfeal")
 

@@ -207,7 +207,7 @@ class ViewConfig(Strict):
 
     @property
     def render(self) -> RenderConfig:
-        """How images are drawn."""
+        """Settings of drawing."""
         return _part(RenderConfig, self._drawing())
 
     def _drawing(self) -> dict[str, Any]:
@@ -356,12 +356,12 @@ class CollectConfig(ViewConfig, PlaceConfig):
 
     @property
     def collection(self) -> CollectionConfig:
-        """How the camera moves."""
+        """Settings of the camera's movement."""
         return self._parts[1]
 
     @property
     def render(self) -> RenderConfig:
-        """How images are drawn."""
+        """Settings of drawing."""
         return self._parts[2]
 
     @property

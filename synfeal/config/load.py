@@ -39,7 +39,7 @@ def describe(error: ValidationError) -> str:
     """Describe the first problem in a line: dotted key, what is wrong, found and allowed."""
     first = error.errors()[0]
     key = ".".join(str(part) or "''" for part in first["loc"] if "[" not in str(part))
-    if first["type"] == "missing" and isinstance(first["loc"][-1], int):  # of a list
+    if first["type"] == "missing" and isinstance(first["loc"][-1], int):  # an element of a list
         key, _, place = key.rpartition(".")
         return f"{key}: must hold at least {int(place) + 1} values"
     if first["type"] == "missing":

@@ -1,4 +1,4 @@
-"""How fields of configurations are shown to a person: in help and in docstrings."""
+"""Names and defaults of configuration fields as help and docstrings show them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pydantic.fields import FieldInfo
 
 
 class Shown(NamedTuple):
-    """How a field is shown, where its type and default do not say it.
+    """Words for a field in help, where its type and default do not say enough.
 
     Attributes:
         values: Names of its values.

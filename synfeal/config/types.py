@@ -27,7 +27,7 @@ NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, lt=1)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
 Count = Annotated[int, Field(ge=1, le=10**9)]
-MOST_FRAMES = 10**7  # of a split: at 30 frames/s four days, and 1.3 GB of poses while it is planned
+MOST_FRAMES = 10**7  # per split: four days at 30 frames/s; planning takes 1.3 GB
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Channel = Annotated[int, Field(ge=0, le=255)]
 

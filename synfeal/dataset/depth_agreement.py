@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 Depth = NDArray[np.float32]
 N_FRAMES, N_POINTS = 24, 300  # frames that are compared, each with each, and points of each
 FRAMES_TRIED, POINTS_TRIED = 14, 100  # the same, where another reading is tried
-TOLERANCE = 0.03  # of depth, within which two measurements agree
+TOLERANCE = 0.03  # relative difference of depths that agree
 FOCAL_TOLERANCE = 0.015  # the same, for comparing focal lengths
 MIN_FRAMES = 4  # two or three may be strange to each other without being wrong
 MIN_COMPARED = 300  # points that another frame must have measured, for anything to be said
@@ -137,7 +137,7 @@ def sample_of(posed: PosedDepth) -> Sample:
 
 
 class Agreement(NamedTuple):
-    """How depth and poses agree.
+    """Agreement of depth and poses.
 
     Attributes:
         share: Share of points that other frames confirm, of those they confirm or look through; NaN
@@ -164,8 +164,8 @@ def agreement(
     """Measure which share of points other frames confirm.
 
     Args:
-        sample: Of depth images.
-        camera: Of depth.
+        sample: Sample of the depth images.
+        camera: Camera of the depth images.
         world_from_cam: Poses (N, 4, 4) in place of the sample's.
         scale: Factor on all depths.
         tolerance: Relative difference of depth that counts as agreement.

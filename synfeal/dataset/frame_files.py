@@ -35,8 +35,8 @@ from synfeal.records.files import atomic_path
 
 SUFFIX = ".zip"
 MOST_OPEN = 16  # archives; each holds a file descriptor
-MOST_BYTES = 2**28  # of a member; no frame is that large, but a damaged archive may say so
-MOST_PIXELS = 8192**2  # of a frame, as of a camera
+MOST_BYTES = 2**28  # no member is that large, but a damaged archive may say so
+MOST_PIXELS = 8192**2  # in a frame, as in a camera
 # The earliest time the format knows: archives of the same frames are the same bytes.
 EPOCH = (1980, 1, 1, 0, 0, 0)
 UNIX, PLAIN_FILE = 3, 0o100644
@@ -231,7 +231,7 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 _HEADER = struct.Struct(">IIBBBBB")  # of IHDR
-_START = len(SIGNATURE) + 8 + _HEADER.size + 4  # of what follows IHDR
+_START = len(SIGNATURE) + 8 + _HEADER.size + 4  # where what follows IHDR begins
 
 
 def decode_png(content: bytes) -> Pixels | None:

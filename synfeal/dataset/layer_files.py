@@ -27,7 +27,7 @@ from synfeal.records.files import read_json, write_json
 from synfeal.render.surface import Ids, Normals
 
 MASKS = "masks.json"
-SCALE, MIDDLE = 127, 128  # of stored normals
+SCALE, MIDDLE = 127, 128  # how normals are stored
 MOST_IDS = 65535
 ENCODING = {
     "normals": "8-bit RGB: x right, y down, z forward of the camera, facing it, as"

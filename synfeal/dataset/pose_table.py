@@ -30,7 +30,7 @@ SUPPORT = ("status", "inliers", "confidence")
 # Further columns of poses that a network gave: whether it has seen the like of a picture.
 SEEN = ("status", "typicality", "outside_m")
 UNIT_TOLERANCE = 1e-2
-FARTHEST_GUESS_M = 1e100  # of a network that diverged; its square can still be computed with
+FARTHEST_GUESS_M = 1e100  # a network that diverged; its square is still finite
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,7 @@ class _Entry:
     """The files that one frame number has."""
 
     sequence: Path
-    prefix: str  # of its name: ``seq-01/`` or nothing
+    prefix: str  # before its number: ``seq-01/`` or nothing
     number: str  # as it is written, ``000000``
     files: dict[str, str]  # by kind: color, depth, pose
 

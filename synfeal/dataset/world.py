@@ -88,7 +88,7 @@ def write_sequence_from_world(folder: Path, sequence_from_world: NDArray[np.floa
 
 @dataclass(frozen=True)
 class ScanRecord:
-    """What ``synfeal scan`` noted of a mesh.
+    """Notes of ``synfeal scan`` about a mesh.
 
     Attributes:
         source: File that the record stands in, for messages.

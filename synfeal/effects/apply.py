@@ -246,7 +246,7 @@ class _Path:
 
     @cached_property
     def _rays_cam(self) -> NDArray[np.float32]:
-        """Of all pixels (H, W, 3), at depth 1 m; 0 where a lens shows nothing."""
+        """Points (H, W, 3) of all pixels at depth 1 m; 0 where a lens shows nothing."""
         directions = cell_directions(self.camera, self.camera.width, self.camera.height)
         return np.nan_to_num(directions).astype(np.float32)
 

@@ -19,12 +19,12 @@ from synfeal.effects.files import LIGHT_GROUPS
 
 Light = NDArray[np.float32]
 Rgb = NDArray[np.uint8]
-STEPS = 2**15 - 1  # of light: less than a tenth of a level of the file even where it is darkest
+STEPS = 2**15 - 1  # levels of light: finer than a tenth of a level of the file, even in the dark
 
 _LIGHT: Light = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
 _LEVEL: Rgb = np.round(255 * linear_to_srgb(np.arange(STEPS + 1) / STEPS)).astype(np.uint8)
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear sRGB
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # weights of linear sRGB
 DAYLIGHT_K = 6500.0
 _RGB_FROM_XYZ = np.array(
     [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
@@ -86,7 +86,7 @@ class LightState:
     temperature_k: float  # colour temperature; the scene's own is 6500
     wave_vectors: NDArray[np.float64]  # (K, 3) of the smooth change, radians per metre
     phases: NDArray[np.float64]  # (K,) radians
-    amplitude_ev: float  # of each of its waves, stops
+    amplitude_ev: float  # amplitude of each wave, stops
     state: str | None = None  # name in ``STATES``, where the scene's lights are switched
 
     @property

@@ -36,7 +36,7 @@ from synfeal.errors import InputError
 Array = NDArray[np.float64]
 
 NAME = re.compile(r"(?:seq-?(\d+)[/_-])?frame-(\d{6,})(?:\D|$)")
-TIME_SLACK = 0.25  # of a frame
+TIME_SLACK = 0.25  # share of the time between two frames
 
 log = logging.getLogger("synfeal")
 Key = tuple[str, int]  # sequence and number of a frame

@@ -23,7 +23,7 @@ MOST_APART_S = 0.01
 
 
 class Clock(NamedTuple):
-    """How times of estimates are compared with those of a reference.
+    """Comparison of an estimate's times with those of a reference.
 
     Attributes:
         most_apart_s: Largest difference of two times of one pair.

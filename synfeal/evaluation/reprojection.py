@@ -120,7 +120,7 @@ def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig)
     cells = cell_pixels(camera, *CELLS).reshape(-1, 2)
     offset = pixel_offset(camera, cells, pixels_of_points(camera, points))
     share = np.linalg.norm(offset, axis=-1) / np.hypot(camera.width, camera.height)
-    share = np.fmin(share, 1.0)  # of a point that the camera cannot show, 1
+    share = np.fmin(share, 1.0)  # 1 where the camera cannot show the point
     with np.errstate(invalid="ignore"):
         return np.asarray((share * seen).sum(axis=1) / seen.sum(axis=1))
 

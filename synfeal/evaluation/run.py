@@ -57,7 +57,7 @@ class Settings(NamedTuple):
     rate_hz: float | None = None  # frames a second of time stamps; None is DEFAULT_RATE_HZ
     labels: Path | None = None  # poses of the same frames as a second yardstick
     camera: Path | None = None  # calibration file, for the DCRE
-    file_format: FormatName | None = None  # of the poses; None tells it by what the file holds
+    file_format: FormatName | None = None  # None recognises it by what the file holds
     # between two files with times: largest difference of those of one pair, and what is added to
     # the times of the estimates
     most_apart_s: float = MOST_APART_S

@@ -17,7 +17,7 @@ Corner = tuple[int, int, int]
 # box instead would let it grow into the walls until the bound is used up.
 UNWANTED_WEIGHT = 2.0
 MOST_BOXES = 10
-LEAST_GAIN = 0.04  # of all wanted points, that a box adds to those before it
+LEAST_GAIN = 0.04  # share of all wanted points that another box must add
 WALL = 1 / 3  # an upright layer of a box of which less is wanted is a wall, with a door or without
 
 
@@ -135,7 +135,7 @@ def _best_rectangle(worth: NDArray[np.float64]) -> tuple[float, tuple[int, int],
     gains = until[:, 1:] - np.minimum.accumulate(until[:, :-1], axis=1)
     y1, pair = (int(index) for index in np.unravel_index(gains.T.argmax(), gains.T.shape))
     (x0, x1), before = pairs[pair].tolist(), until[pair, : y1 + 1]
-    y0 = int(np.flatnonzero(before == before.min())[-1])  # of several the shortest run
+    y0 = int(np.flatnonzero(before == before.min())[-1])  # the shortest run if there are several
     return float(gains[pair, y1]), (x0, y0), (x1, y1)
 
 

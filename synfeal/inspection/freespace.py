@@ -28,9 +28,9 @@ CLEARANCE_M = 0.3
 CAMERA_HEIGHT_M = (0.8, 2.0)  # hand-held cameras, above the floor
 FLOOR_BIN_M = 0.05
 N_PLACES = 400  # that are tested for seeing each other
-N_HUBS = 100  # of these, to tell what else belongs to their space
-LEAST_GROUP = 0.2  # of the places: smaller groups are nooks, and the insides of things
-LEAST_FLOOR = 0.15  # of the places to stand of a space
+N_HUBS = 100  # places from which the rest of their space is told
+LEAST_GROUP = 0.2  # share of the places: smaller groups are nooks and insides of things
+LEAST_FLOOR = 0.15  # share of a space's places to stand
 FLOORS_APART_M = 0.5
 
 DEFINITION = (

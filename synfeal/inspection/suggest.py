@@ -41,14 +41,14 @@ SLACKS = (SLACK, 2 * SLACK, 1.0)  # the last leaves out only what is outside
 NARROW_M = 0.6  # least path and view in a space too narrow for the defaults
 CLEARANCES_M = (0.2, 0.0)
 MIN_SEEN = (None, 0.7, 0.9, 0.97)
-MAX_EMPTY = 0.1  # of the pixels: more than windows let through
-MAX_MOSTLY_EMPTY = 0.1  # of the frames; a data set with a quarter of them is invalid
-ENOUGH_BOXES = 0.75  # of what the boxes hold, in which paths were found
+MAX_EMPTY = 0.1  # share of the pixels: more than windows let through
+MAX_MOSTLY_EMPTY = 0.1  # share of the frames; validate refuses a quarter
+ENOUGH_BOXES = 0.75  # share of the boxes' space in which paths were found
 TRIAL_FRAMES, TRIAL_TRIES = 30, 300  # to tell whether there are paths in a box
 N_LOOKED_AT = 80  # frames that are drawn
 LOOK_CAMERA = CameraConfig(width=160, height=120)
-MAX_PLAIN = 0.5  # of the surface
-MAX_OF_ONE_COLOR = 0.02  # of the frames; a data set with a twentieth of them is invalid
+MAX_PLAIN = 0.5  # share of the surface
+MAX_OF_ONE_COLOR = 0.02  # share of the frames; validate refuses a twentieth
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Emptiness:
     """Shares of the images that would show nothing.
 
     Attributes:
-        share: Of all pixels.
+        share: Share of all pixels.
         mostly_empty_frames: Share of the frames of which more than half is empty.
     """
 

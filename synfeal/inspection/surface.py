@@ -111,7 +111,7 @@ def area_by_color(mesh: TexturedMesh) -> dict[str, float]:
 MAX_FACES = 60_000
 SIMPLIFY_ABOVE = 30_000  # the rest of the budget goes to splitting what large triangles remain
 NORMAL_M = 0.1  # how far apart two colours seem that face opposite ways, halved
-MIN_EDGE_SHARE = 1 / 400  # of the longest extent: finer than that no triangle is split
+MIN_EDGE_SHARE = 1 / 400  # share of the longest extent: no triangle is split finer
 N_NEAREST = 4
 ACROSS_RAD = -2.2  # across the corners of a room
 STEPS = 32_000  # int16 on either side of the middle

@@ -31,8 +31,8 @@ AXIS: Floats = np.array([0.8, 0.2, 0.32**0.5])  # unit length
 # Brightness of a free surface is MIDDLE + SLOPE * |cosine to the axis|: 0.75 to 1.
 MIDDLE, SLOPE = 0.75, 0.25
 LEAST = 0.15  # brightness of what is shut in
-LIFT = 1e-4  # of the mesh's extent, between a vertex and the starts of its rays
-INWARDS = 0.1  # of the way from a vertex to the middle of its triangles
+LIFT = 1e-4  # rays start this share of the mesh's extent above a vertex
+INWARDS = 0.1  # and this share of the way to the middle of its triangles
 AT_ONCE = 20_000  # vertices whose rays are cast together
 
 

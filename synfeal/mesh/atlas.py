@@ -73,7 +73,7 @@ class _Charts(NamedTuple):
     vertices: Ints  # (W,) which vertex of the mesh each corner of a chart is
     faces: Ints  # (F, 3) indices into these, in the order of the mesh
     uv_px: Floats  # (W, 2) column and row of each in the image, texels
-    size: tuple[int, int]  # of the image: height, width
+    size: tuple[int, int]  # height and width of the image
 
 
 def _charts(part: MeshPart, texel_m: float) -> _Charts:

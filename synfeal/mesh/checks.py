@@ -23,7 +23,7 @@ from synfeal.mesh.model import Findings, MeshPart, TexturedMesh
 LEVELS = 1.0  # grey levels that rounding may make
 # A face is without area if its height is rounding: of its longest edge, or of its coordinates.
 RELATIVE_HEIGHT = 1e-12
-MOST_REPEATED, FEW_REPEATED = 0.03, 10  # of a part's faces, and faces, that repeat others
+MOST_REPEATED, FEW_REPEATED = 0.03, 10  # share and number of a part's faces that repeat others
 ROUNDING = 4 * np.finfo(np.float64).eps
 
 
@@ -102,7 +102,7 @@ def check_sampling_box(box: NDArray[np.float64], bounds_m: NDArray[np.float64], 
     raise InputError(
         name,
         f"the sampling box {_show(box)} m {problem} the mesh, which spans {_show(bounds_m)} m;"
-        " unit_m or up_axis is probably wrong",
+        " `unit_m` or `up_axis` is probably wrong",
     )
 
 

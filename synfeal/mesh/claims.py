@@ -20,8 +20,8 @@ ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # by compon
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 # Values that glTF takes as 0 because nothing is stored: bases of morph targets, little else.
 MOST_UNSTORED_BYTES = 2**28
-SHORTEST_M = 1e-3  # of a mesh; vertices 0.01 mm apart are one
-MOST_FACES = 10**8  # of all instances together; they take 5 GB
+SHORTEST_M = 1e-3  # length of a mesh; vertices 0.01 mm apart are merged
+MOST_FACES = 10**8  # all instances together; they take 5 GB
 
 
 def check_accessors(path: Path, header: Json) -> None:

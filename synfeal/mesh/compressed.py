@@ -256,7 +256,8 @@ def decode_meshopt(data: bytes, stored: Json) -> bytes:
         raise ValueError(f"{len(data)} bytes claim to hold {count} x {stride}")
     if mode != "ATTRIBUTES":
         decode = getattr(meshopt, f"decode_index_{INDICES[mode]}")
-        index = np.asarray(decode(count, 4, data))  # of two bytes it would put two into one number
+        # Asked for two bytes, it would put two indices into one number.
+        index = np.asarray(decode(count, 4, data))
         return index.astype(f"<u{stride}").tobytes()
     content = meshopt.decode_vertex_buffer(count, stride, data, dtype=np.dtype((np.void, stride)))
     name = stored.get("filter", "NONE")

@@ -22,7 +22,7 @@ def opaque_side(part: MeshPart, opacity: Floats, cutoff: float) -> MeshPart:
 
     Args:
         part: In any frame.
-        opacity: Of each vertex (V,), 0 to 1.
+        opacity: Opacity of each vertex (V,), 0 to 1.
         cutoff: Above 0.
 
     Returns:

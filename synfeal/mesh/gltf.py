@@ -126,12 +126,12 @@ def _check_kinds(value: Json, place: str) -> None:
     in_extensions = place.endswith("extensions/")
     for key, inner in value.items():
         if key == "extras" or (in_extensions and key not in EXTENSIONS):
-            continue  # of other programs, which put there what they like
+            continue  # other programs put there what they like
         if (key in MAPPINGS or in_extensions) and not isinstance(inner, dict):
             raise ValueError(f"{place}{key} of its JSON must be a mapping")
         if key == "uri" and not isinstance(inner, str):
             raise ValueError(f"{place}{key} of its JSON must be text")
-        are_indices = key == "nodes" and place  # of a scene
+        are_indices = key == "nodes" and place  # those of a scene are indices
         if key in LISTS and not are_indices:
             if not isinstance(inner, list) or not all(isinstance(part, dict) for part in inner):
                 raise ValueError(f"{place}{key} of its JSON must be a list of mappings")

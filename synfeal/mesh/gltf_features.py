@@ -1,4 +1,4 @@
-"""What a glTF has that an unlit image of a scene at rest does not show: named, each in a sentence.
+"""Features of a glTF that an unlit image of a scene at rest does not show, each in a sentence.
 
 The list follows the glTF 2.0 specification (Khronos, 3.5 to 3.12) and the extension registry
 (https://github.com/KhronosGroup/glTF/tree/main/extensions), gone through in 2026. What is not named

@@ -38,12 +38,12 @@ MAX_PIXELS = 2**28  # a square of that side, 1 GB when decoded: what is larger i
 
 @dataclass(frozen=True)
 class BaseMaterial:
-    """What an unlit image shows of a glTF material.
+    """Properties of a glTF material that an unlit image shows.
 
     Attributes:
         texture: Pixels (H, W, 3 | 4), or None.
         base_color: Colour (4,) uint8, sRGB.
-        alpha_cutoff: Of texture and base colour; None where they are opaque.
+        alpha_cutoff: Least opacity shown, of texture and base colour; None where they are opaque.
         uv_transform: Matrix (3, 3) for texture coordinates with the origin at the top left.
         vertex_cutoff: Opacity below which vertices are not seen; None where theirs does not count.
         wrap: How the texture goes on beyond 0 and 1, along u and v, by glTF's numbers.
@@ -150,7 +150,7 @@ class MaterialReader(_Decoder):
 
     def vertex_opacity(self, geometry: trimesh.Trimesh) -> NDArray[np.float64] | None:
         """Return the opacity (V,) of a trimesh geometry's vertices; None if all are opaque."""
-        if SRGB_ATTRIBUTE in geometry.vertex_attributes:  # of our own, always opaque
+        if SRGB_ATTRIBUTE in geometry.vertex_attributes:  # our own files, always opaque
             return None
         stored = _stored_colors(geometry)
         if stored is None or np.shape(stored)[1] < 4:

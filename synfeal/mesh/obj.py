@@ -23,12 +23,12 @@ from synfeal.mesh.references import ReferenceResolver
 Pixels = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 
-GREY = 102  # of what has no colour: as dark as what other programs show there
+GREY = 102  # level of what has no colour, as other programs show it
 MOST_NAMED = 5  # names in one finding
 
 
 class ObjMaterial(NamedTuple):
-    """What an unlit image shows of a material.
+    """Properties of a material that an unlit image shows.
 
     Attributes:
         base_color: Colour (4,) with alpha.
@@ -121,7 +121,7 @@ class _Library:
         self._opaque: set[str] = set()
         self._reduced: dict[str, ObjMaterial] = {}
         self._only: str | None = None
-        self._folders: dict[str, PurePosixPath] = {}  # of the library that defines a material
+        self._folders: dict[str, PurePosixPath] = {}  # folder of its library, by material
 
     def read(self, text: ObjText) -> None:
         """Read all libraries, and name what faces use that none of them defines."""

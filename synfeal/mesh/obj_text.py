@@ -39,7 +39,7 @@ FREE_FORM |= {"scrv", "sp", "end", "con", "cdc", "cdp", "res", "ctech", "stech",
 
 
 class Use(NamedTuple):
-    """What faces are said to belong to; None where nothing is said."""
+    """Groups that faces are said to belong to; None where nothing is said."""
 
     object: str | None = None
     group: str | None = None
@@ -143,7 +143,7 @@ def _chunks(text: bytes) -> Iterator[bytes]:
 
 @dataclass
 class _Reader:
-    """What was read of the lines so far."""
+    """State of reading, after the lines so far."""
 
     vertices: list[Floats] = field(default_factory=list)
     colors: list[Floats] = field(default_factory=list)
@@ -261,7 +261,7 @@ class _Reader:
             if len(words) < 3:
                 self.n_short += len(group)
                 continue
-            columns = [0]  # of the vertex of each corner, and where the next one would be
+            columns = [0]  # column of each corner's vertex, and of what would follow
             for word in words:
                 separators = word.count(b"/") + word.count(b"|")
                 columns.append(columns[-1] + 1 + separators)

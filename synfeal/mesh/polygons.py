@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 BLOCK = 1 << 18  # polygons looked at together, for the sake of memory
-TOLERANCE = 1e-9  # of a polygon's area, by which a triangle may be turned over
+TOLERANCE = 1e-9  # share of a polygon's area by which a triangle may be turned over
 
 
 class Triangulation(NamedTuple):
@@ -117,7 +117,7 @@ def _ears(outline: Floats, normal: Floats) -> tuple[Ints, float] | None:
 
     Args:
         outline: Corners (n, 3).
-        normal: Of the plane that fits them; not zero.
+        normal: Normal of the plane that fits them; not zero.
 
     Returns:
         Triangles (n - 2, 3), those left over without an area, and how much of the polygon's area

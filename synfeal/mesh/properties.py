@@ -63,8 +63,8 @@ def mesh_topology(vertices_m: Vertices, faces: Indices) -> dict[str, Any]:
         volume_m3 = float(np.sum(a * np.cross(b, c)) / 6.0)
     return {
         "components": _group(edges)[0],  # pieces of triangles joined at vertices
-        "boundary_edges": len(rim),  # of exactly one triangle
-        "non_manifold_edges": int((n_faces > 2).sum()),  # of more than two
+        "boundary_edges": len(rim),  # edges with one triangle
+        "non_manifold_edges": int((n_faces > 2).sum()),  # edges with three or more
         # Of the rim of each hole, longest first; holes that touch count as one.
         "hole_lengths_m": np.sort(holes_m)[::-1].tolist(),
         "watertight": watertight,  # every edge belongs to exactly two triangles

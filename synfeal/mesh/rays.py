@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 # between the triangles that meet there. Whoever aims by hand aims at vertices: a camera in the
 # middle of a room, a wall split in the middle. So all rays are moved sideways, by less than the
 # accuracy promised and in a direction no mesh is built along.
-SIDESTEP = 5e-7  # of the mesh's extent
+SIDESTEP = 5e-7  # share of the mesh's extent
 SIDEWAYS = np.array([0.3607, 0.7243, 0.5876])
 NOTHING = -1  # what Embree answers where a ray meets no triangle
 

@@ -22,7 +22,7 @@ from synfeal.mesh.materials import SRGB_ATTRIBUTE, linear_from_srgb
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.records.files import atomic_path
 
-FLOAT32_BITS = 24  # of the mantissa
+FLOAT32_BITS = 24  # bits of the mantissa
 
 
 def _png(pixels: NDArray[np.uint8]) -> Image.Image:
@@ -89,7 +89,7 @@ def storage_grid(bounds_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], fl
 
 
 class _Look(NamedTuple):
-    """What parts that look alike have in common."""
+    """Properties that parts which look alike have in common."""
 
     texture: int
     base_color: bytes

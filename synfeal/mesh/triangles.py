@@ -31,7 +31,7 @@ PLY_END = b"end_header\n"
 PLY_VERTEX = np.dtype(("<f8", 3))
 PLY_FACE = np.dtype([("corners", "u1"), ("index", "<u4", 3)])
 MERGE_M = 1e-5  # copies of a vertex on a texture seam differ by rounding only
-NO_LIMIT = 1e9  # of the error, in diameters of the mesh: the number of faces alone decides
+NO_LIMIT = 1e9  # error in diameters of the mesh: the number of faces alone decides
 
 
 class Triangles(NamedTuple):

@@ -25,8 +25,8 @@ from synfeal.geometry.poses import inverse
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 0.01  # of depth, relative
-ROUNDING_UNITS = 2.0  # of stored depth
+TOLERANCE = 0.01  # relative difference of depth
+ROUNDING_UNITS = 2.0  # units of stored depth
 # Second difference of inverse depth, relative, from which three pixels are on no plane.
 BENT = 0.01
 # Difference of inverse depth, relative, from which neighbours are parted by an edge, not a crease.

@@ -86,7 +86,7 @@ def read_depth_frames(
 
     Args:
         dataset: Its directory.
-        splits: Of which splits, if the data set has any.
+        splits: Splits to take frames of, if the data set has any.
         camera_file: A calibration in place of the manifest's camera.
         every: Take every such frame of each sequence.
 

@@ -44,8 +44,8 @@ SCHEMA = {
     "angle_deg": NUMBER,
     "flow": MAYBE_TEXT,
 }
-MOST_FRAMES = 20_000  # of which all pairs are compared: 1.6 GB of overlaps
-MOST_POINTS = 2 * 10**8  # of all frames: 4.8 GB
+MOST_FRAMES = 20_000  # all pairs of them are compared: 1.6 GB of overlaps
+MOST_POINTS = 2 * 10**8  # in all frames together: 4.8 GB
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ OFTEN = 3  # frames
 FARTHEST_M = 5.0
 LIFT_M = 0.01  # rays stop this far in front of the surface they are to reach
 COLUMNS, ROWS = 16, 12  # rays of a frame: its share is then known to a few per cent
-MOSTLY = 0.5  # of a frame
+MOSTLY = 0.5  # share of a frame
 VOXEL_M, WITHIN_VOXELS = 0.25, 2.0
 MAX_VOXELS = 20_000  # in larger boxes voxels are larger
 N_HEADINGS = 8
@@ -61,8 +61,8 @@ class SeenSurface(NamedTuple):
     """Counts of surface points."""
 
     visible: int  # those that can be seen from the free space at all
-    seen: int  # of these, those in at least one frame
-    seen_often: int  # of these, those in at least ``OFTEN`` frames
+    seen: int  # how many of them at least one frame shows
+    seen_often: int  # how many of them at least ``OFTEN`` frames show
 
 
 def seen_surface(
@@ -129,8 +129,8 @@ def in_image(camera: CameraConfig, world_from_cam: Array, points_m: Array) -> ND
 class EmptyPixels:
     """Shares of a plan's frames that show nothing."""
 
-    share: float  # of all pixels
-    worst_frame_share: float  # of the pixels of the emptiest frame
+    share: float  # share of all pixels
+    worst_frame_share: float  # share of the emptiest frame's pixels
     mostly_empty_frames: float  # share of the frames of which more than half is empty
 
 

@@ -41,7 +41,7 @@ class Like:
     Attributes:
         box: x0, x1, y0, y1, z0, z1 of camera centres in the mesh's world, metres.
         roll_deg: Bounds; so are ``pitch_deg``, positive down, and ``yaw_deg``.
-        camera: Of the photographs, None where nothing says.
+        camera: Camera of the photographs, None where nothing says.
         n_frames: Photographs that it was taken from.
     """
 

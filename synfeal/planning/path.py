@@ -185,6 +185,6 @@ def independent_poses(space: PoseSpace, collection: CollectionConfig, n_frames: 
                 "plan",
                 f"no admissible pose among {n_empty * BLOCK} candidates that looks farther than"
                 f" min_view_distance_m ({space.min_view_distance_m} m){space.also_asked}",
-                "lower it, or widen sampling_box",
+                "lower it, or widen the box",
             )
     return np.concatenate(kept)[:n_frames]

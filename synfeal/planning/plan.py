@@ -156,7 +156,7 @@ def plan_split(
             "plan",
             f"a path across the sampling box ({longest_m:.3g} m) would have more than"
             f" {MOST_OF_PATH} frames",
-            f"raise the frame spacing ({collection.frame_spacing_m:g} m), or give another unit_m",
+            f"raise the frame spacing ({collection.frame_spacing_m:g} m), or give another `unit_m`",
         )
     # One generator for each box, so that none shifts another's numbers.
     generators = [rng] if len(boxes) == 1 else rng.spawn(len(boxes))
@@ -274,7 +274,7 @@ def _stuck(at: Array, space: PoseSpace, collection: CollectionConfig) -> InputEr
         "plan",
         f"no admissible target from ({where}) in {collection.max_tries} rounds of"
         f" {collection.candidates} candidates",
-        f"lower min_path_m ({collection.min_path_m} m) or min_view_distance_m"
+        f"lower `min_path_m` ({collection.min_path_m} m) or `min_view_distance_m`"
         f" ({space.min_view_distance_m} m){_or_clearance(space)}, or widen the sampling box",
     )
 
@@ -283,7 +283,7 @@ def _or_clearance(space: PoseSpace) -> str:
     """Name the clearance among what may be lowered, if there is one."""
     if space.clearance is None:
         return ""
-    return f" or min_clearance_m ({space.clearance.min_clearance_m} m)"
+    return f" or `min_clearance_m` ({space.clearance.min_clearance_m} m)"
 
 
 def _pose_table(poses: Array, path: NDArray[np.int64]) -> PoseTable:

@@ -19,7 +19,7 @@ from synfeal.geometry.poses import quat_wxyz_of
 from synfeal.geometry.rigid import refuse_non_rigid
 from synfeal.geometry.rotations import canonical_quat_wxyz, matrix_from_quat_wxyz
 
-MOSTLY = 0.9  # of the cameras
+MOSTLY = 0.9  # share of the cameras
 
 log = logging.getLogger("synfeal")
 
@@ -50,7 +50,8 @@ def repeated_poses(
     if not inside.all():
         where = ", ".join(f"{value:.2f}" for value in table.position_m[np.argmin(inside)])
         log.warning(
-            "%s: %d of %d poses lie outside the mesh, the first at (%s) m; check unit_m, up_axis",
+            "%s: %d of %d poses lie outside the mesh, the first at (%s) m; check `unit_m` and"
+            " `up_axis`",
             source,
             np.sum(~inside),
             n_frames,

@@ -204,7 +204,7 @@ class PoseSpace:
         """Clause on the clearance for messages that no free view was found; may be empty."""
         if self.clearance is None:
             return ""
-        return f" and keeps min_clearance_m ({self.clearance.min_clearance_m} m) from surfaces"
+        return f" and keeps `min_clearance_m` ({self.clearance.min_clearance_m} m) from surfaces"
 
     def sample(self, count: int) -> PoseVectors:
         """Draw pose vectors (count, 6), uniform within the bounds."""
@@ -259,9 +259,9 @@ def largest_group(space: PoseSpace, max_tries: int, n_poses: int) -> PoseVectors
     if not len(found):
         raise InputError(
             "plan",
-            "no pose in the sampling box looks farther than min_view_distance_m"
+            "no pose in the sampling box looks farther than `min_view_distance_m`"
             f" ({space.min_view_distance_m} m){space.also_asked}",
-            "lower it, or check sampling_box, unit_m and up_axis",
+            "lower it, or check the box, `unit_m` and `up_axis`",
         )
     group = seeing_groups(space.caster, found[:, :3])
     largest: PoseVectors = found[group == np.bincount(group).argmax()]

@@ -34,7 +34,7 @@ REMEDY = "make that table again"
 class Kind:
     """Type of the cells of a column."""
 
-    dtype: str  # of the column in memory
+    dtype: str  # type of the column in memory
     optional: bool = False  # cells may be empty or "nan"; in memory they are missing values
     expected: bool = True  # files must have the column; without it, all its cells are missing
     finite: bool = True

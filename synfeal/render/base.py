@@ -138,7 +138,7 @@ def floor_share(render: RenderConfig) -> float:
     return EDGE_ON_SHARE if render.shade == "headlight" else 1.0
 
 
-SAMPLES_PER_AXIS = 8  # of a pixel, of reference images
+SAMPLES_PER_AXIS = 8  # in each pixel of reference images
 
 
 def reference_images(

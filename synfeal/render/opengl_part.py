@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 # a third at 128x96.
 FACES_PER_CHUNK = 128
 BITS_PER_AXIS = 10
-MARGIN = 1e-4  # of the part's size: far beyond what single precision on the device can move
+MARGIN = 1e-4  # share of the part's size: far more than single precision on the device moves
 
 # Textures are read from the mip level nearest to what the samples ask for, half a level sharper.
 # Trilinear filtering takes a sixth longer for a mean error 4 % smaller; without the shift the error

@@ -28,7 +28,7 @@ from synfeal.records.files import read_json
 
 Array = NDArray[np.float64]
 TUM_UNITS_PER_M = 5000.0  # what the TUM benchmark stores a metre of depth as
-MOST_ASIDE_M = 10.0  # of the depth camera from the colour camera
+MOST_ASIDE_M = 10.0  # distance between the colour and the depth camera
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,11 @@ from synfeal.scanning.seen import Floats, project, sampled, seen_points, within
 
 N_POINTS, N_FRAMES = 40_000, 60
 SHRINK = 2  # sides of photographs: averages noise and compression, and widens the valley
-MIN_SIGHTINGS = 3  # of a point, for it to count
+MIN_SIGHTINGS = 3  # frames that must see a point for it to count
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)
 # The fit: steps it begins with and how far it may go; beyond, what is given is not nearly right.
 STEP_FOCAL, STEP_CENTRE, MOST_FOCAL = 0.01, 0.005, 0.25
-MIN_GAIN = 0.02  # of the disagreement, for a fitted calibration to be worth more than the given one
+MIN_GAIN = 0.02  # a fitted calibration replaces the given one if it agrees better by this share
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Sightings:
         """Return the share of variance within points, 0 to about 1; NaN where too few are seen.
 
         Args:
-            camera: Of the photographs at their full size.
+            camera: Camera of the photographs at their full size.
         """
         small = shrunk(camera, SHRINK)
         values = np.zeros(len(self.vertex), np.float32)
@@ -132,8 +132,8 @@ class ColorFit:
     Attributes:
         given: What was given.
         fitted: The best, the same where nothing better was found.
-        given_disagreement: Of the given one, see :class:`Sightings`.
-        fitted_disagreement: Of the best.
+        given_disagreement: Disagreement with the given calibration, see :class:`Sightings`.
+        fitted_disagreement: Disagreement with the best.
     """
 
     given: CameraConfig

@@ -31,7 +31,7 @@ class Comparison:
     """One photograph and the scan from its pose.
 
     Attributes:
-        name: Of the frame.
+        name: Name of the frame.
         photograph: (H, W, 3), shrunk.
         rendering: (H, W, 3).
         covered: (H, W) where the scan has a surface.
@@ -64,7 +64,7 @@ def compare(
         mesh: In a world.
         frames: Photographs.
         world_from_cam: Their poses (N, 4, 4) in that world.
-        camera: Of the photographs.
+        camera: Camera of the photographs.
         on_frame: Called after every frame.
     """
     small = shrunk(camera, SHRINK)

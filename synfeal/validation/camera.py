@@ -37,7 +37,7 @@ class Lens:
         rays: Points (N, 3) at depth 1 that they see.
         curvature: By how much at most, as a share of it, depth that is interpolated between pixels
             is off on a plane.
-        share: Of the points that two frames see, how many must agree in depth.
+        share: Share of the points seen by two frames that must agree in depth.
     """
 
     curvature = 0.0

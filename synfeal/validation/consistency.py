@@ -30,14 +30,14 @@ from synfeal.validation.check import PNG, Check
 from synfeal.validation.poses import GAPS
 from synfeal.validation.reprojection import ComparedFrame, Residual, camera_normal, compare
 
-GRID_PIXELS = 5000  # of each frame are moved to the other one
+GRID_PIXELS = 5000  # pixels of each frame that are moved to the other one
 MIN_OVERLAP = 0.2
 # Frames that moved and turned by less must share most of what they see, in any scene.
 SMALL_STEP_M = 0.3
-SMALL_TURN = 0.25  # of the field of view
+SMALL_TURN = 0.25  # share of the field of view
 # From much nearer or farther, a texture is drawn at another level of detail.
 COLOR_OVERLAP = 0.6
-VIEWS_BYTES = 2**29  # of frames that are kept decoded; a pixel of one takes 13
+VIEWS_BYTES = 2**29  # decoded frames that are kept; a pixel takes 13 bytes
 CAMERA_PAIRS = 200  # from which the camera is judged, evenly spread over more
 
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)

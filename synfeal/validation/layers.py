@@ -32,9 +32,9 @@ from synfeal.errors import InputError
 from synfeal.validation.check import PNG, Check
 
 MOST_COMPARED = 60  # frames whose normals are compared with depth
-COLUMNS, ROWS = 16, 12  # of the cells
+COLUMNS, ROWS = 16, 12  # cells of an image
 MOST_DEG = 10.0  # median over the cells of a frame
-LENGTH_SLACK = 0.02  # of stored normals: rounding makes them up to 0.007 longer or shorter
+LENGTH_SLACK = 0.02  # rounding makes stored normals up to 0.007 longer or shorter
 MOST_APART = 0.01  # share of the pixels where layers and depth differ in whether there is anything
 FACING = 0.02  # cosine to the ray from which a normal points away from the camera
 

@@ -18,7 +18,7 @@ def check_rigid(poses: Poses, unreadable: tuple[str, ...]) -> Check:
     """Check that rotations are orthonormal with determinant +1 and the last row is 0 0 0 1.
 
     Args:
-        poses: Of each frame.
+        poses: Pose of each frame.
         unreadable: What is wrong with those that could not be read.
     """
     worst = rigid_defects(np.array(list(poses.values()))).worst.max(initial=0.0)

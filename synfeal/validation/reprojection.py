@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 BEND = 0.05  # 1/z bends by less, of itself, from pixel to pixel on one surface; planes do not bend
 OCCLUSION_RATIO = 1.05  # a point more than 5 % behind the surface is hidden by it
 MIN_PIXELS = 100
-ROUNDING = 0.5  # of stored depth, in its units
-POSE_ROUNDING = 1e-10  # of positions stored with eleven digits, of both frames
-GREY_NOISE = 5.0  # of rendered frames, as resampled here: grey levels
+ROUNDING = 0.5  # units of stored depth
+POSE_ROUNDING = 1e-10  # positions of both frames are stored with eleven digits
+GREY_NOISE = 5.0  # grey levels, in rendered frames as resampled here
 MAX_SHIFT_ERROR_PX = 0.05
 
 

@@ -39,7 +39,7 @@ from synfeal.validation.poses import (
     rigid_poses,
 )
 
-STEREO_PAIRS = 100  # of a large set are compared
+STEREO_PAIRS = 100  # pairs of a large set that are compared
 
 
 def validate(dataset: Path, camera_file: Path | None, every_pair: bool) -> list[Check]:

@@ -65,7 +65,7 @@ class Bays:
         )
 
     def seen_from_second(self) -> Photograph:
-        """What a camera before the middle of the second bay sees."""
+        """Draw the view of a camera before the middle of the second bay."""
         height, width = CAMERA.height, CAMERA.width
         roots = np.sqrt(self.descriptors[1] / self.descriptors[1].sum(1, keepdims=True))
         return Photograph(

@@ -169,7 +169,7 @@ def reference(models, name):
 
 
 def outputs(network, layers, images):
-    """What the layers put out."""
+    """Return the outputs of the layers."""
     found = {}
     for layer in layers:
         hook = lambda _, __, out, layer=layer: found.update({layer: out.clone()})  # noqa: E731

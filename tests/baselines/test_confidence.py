@@ -1,4 +1,4 @@
-"""How sure a pose is, against a simulation of chance."""
+"""Confidence of a pose, against a simulation of chance."""
 
 import math
 

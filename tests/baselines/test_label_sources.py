@@ -1,4 +1,4 @@
-"""What holds for every source of labels alike."""
+"""Properties of every source of labels alike."""
 
 import numpy as np
 import pytest

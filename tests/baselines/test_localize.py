@@ -314,7 +314,7 @@ def poses_of(model, folder, *options, status=0):
 
 
 def pixels_of(folder, trained, **camera):
-    """What the network is shown of each picture."""
+    """Return the input of the network for each picture."""
     reader = PictureReader(trained.description, PhotographCamera(**camera), Path("model.pt"))
     return np.stack([reader(path) for path in sorted(folder.iterdir())]).astype(float)
 

@@ -50,7 +50,7 @@ def evaluated_by_row(dataset, work):
 
 
 def previewed(dataset, work):
-    """Which frames are shown, beside those of the data set in order."""
+    """Return the frames that are shown, beside those of the data set in order."""
     out = work / "preview.gif"
     count = write_preview([dataset], out, 100, 10.0)
     shown = []

@@ -78,7 +78,7 @@ def test_gradients_of_nothing_give_no_step():
 
 
 def test_matrices_of_a_stack_have_nothing_to_do_with_each_other():
-    """Of whatever size; an orthogonal factor does not depend on it at all."""
+    """Matrices of any size; an orthogonal factor does not depend on it at all."""
     torch.manual_seed(1)
     quintics = quintics_for(LOWEST, ITERATIONS)
     gradients = torch.randn(4, 6, 20, dtype=torch.float64)

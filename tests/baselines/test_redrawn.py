@@ -36,7 +36,7 @@ POSE = ("tx", "ty", "tz", "qw", "qx", "qy", "qz")
 
 
 def write_photographs(folder, mesh, poses):
-    """What a camera makes of the room: less light, a blur, noise."""
+    """Photograph the room as a camera does: less light, a blur, noise."""
     folder.mkdir()
     rng = np.random.default_rng(5)
     with open_renderer(mesh, PHOTO, RenderConfig()) as renderer:
@@ -105,7 +105,7 @@ def test_photographs_of_another_room_stay_not_localized(place, tmp_path):
 
 
 def test_another_mesh_is_told_in_one_line(place, tmp_path, capfd):
-    """Of another room; of this room in other units."""
+    """Refuse a mesh of another room, and of this room in other units."""
     other = save_room(tmp_path / "other.glb")
     camera = ("--camera", place / "photo.json")
     out = tmp_path / "poses.csv"
@@ -319,7 +319,7 @@ def test_a_mesh_or_a_map_of_no_sequence_is_in_the_world_of_the_other(place, tmp_
 
 
 def test_a_scan_that_stands_elsewhere_is_found_by_its_record(place, tmp_path, camera):
-    """What is found is in the world of the map, whichever world the mesh is in."""
+    """Poses are in the world of the map, whichever world the mesh is in."""
     mesh_from_map = inverse(SEQUENCE_FROM_MESH) @ SEQUENCE_FROM_MAP
     file = scan_file(tmp_path, SEQUENCE_FROM_MESH)
     save_glb(file, moved(furnished_room(PAINT), mesh_from_map))

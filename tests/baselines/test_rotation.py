@@ -51,7 +51,7 @@ def rotation(seed=0, side_px=PX):
 
 
 def packed_views(poses):
-    """What localizers see at ``world_from_cam`` (N, 4, 4): (N, 3, PX, PX) float levels."""
+    """Return what localizers see at ``world_from_cam`` (N, 4, 4): (N, 3, PX, PX) float levels."""
     # Paint coarse enough that sampling an image twice does not blur it away.
     with open_renderer(furnished_room((20.0,)), CAMERA) as renderer:
         frames = [fit_frame(Image.fromarray(renderer.render(pose)), PX) for pose in poses]

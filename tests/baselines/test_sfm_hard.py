@@ -50,7 +50,7 @@ def write(folder, poses, room=ROOM, camera=CAMERA):
 
 
 def estimate(folder, poses, room=ROOM):
-    """What structure from motion makes of a room."""
+    """Reconstruct a room by structure from motion."""
     return sfm_batch(write(folder, poses, room), CAMERA, poses, CFG, 0)
 
 

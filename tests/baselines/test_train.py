@@ -65,7 +65,7 @@ def run(out, *datasets, images=192, **further):
 
 @pytest.fixture(scope="module")
 def undisturbed(photographs, tmp_path_factory):
-    """What a run without a stop writes."""
+    """Train without a stop."""
     out = tmp_path_factory.mktemp("undisturbed") / "out"
     run(out, photographs)
     return out

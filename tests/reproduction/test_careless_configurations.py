@@ -85,7 +85,7 @@ TABLE = (
 
 
 def read(path):
-    """What the workflow asks of a profile before it plans a run."""
+    """Check a profile as the workflow does before it plans a run."""
     config = read_profile(str(path)).config
     check_mesh_files(config.scenes)
     check_results(config.root)

@@ -208,7 +208,7 @@ def test_a_newer_model_that_is_worse_does_not_make_labels_matter_more(results):
 
 
 def test_single_runs_are_judged_as_uncertainly_as_published_ones_vary(results, monkeypatch):
-    """Of a published fall of 55 % two thirds are 36.7 %: a fall of 45 % holds unless runs vary.
+    """Two thirds of a published fall of 55 % are 36.7 %: a fall of 45 % holds unless runs vary.
 
     With 16 degrees of freedom t is 2.12, so that a ratio of two runs of 20 % each has limits of
     about 0.55 times or over 2.12 root 2 times 20 %, far beyond.

@@ -76,7 +76,7 @@ for make in OPTIMISERS.values():
 
 
 def modules_after(code):
-    """What a new process has imported after this code."""
+    """Return the modules a new process has imported after this code."""
     code += "\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))"
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", code]

@@ -57,7 +57,7 @@ def shown_file():
 
 
 def own_profile(folder, **changes):
-    """That file in a folder, its mesh and its results there too."""
+    """Put that file into a folder, with its mesh and its results."""
     profile = yaml.safe_load(shown_file())
     profile["scenes"]["my_room"]["path"] = str(save_room(folder / "my_room.glb"))
     profile |= {"results": str(folder / "results"), **changes}
@@ -70,7 +70,7 @@ def stored(path, values):
 
 
 def dry_run(profile, *more):
-    """What ``synfeal run -n`` says."""
+    """Return what ``synfeal run -n`` says."""
     command = [sys.executable, "-m", "synfeal.cli", "run", "--profile", str(profile)]
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
     return subprocess.run(

@@ -1,4 +1,4 @@
-"""What a run costs: its jobs as Snakemake lists them, and what measured runs say of them."""
+"""Cost of a run: its jobs as Snakemake lists them, and what measured runs say of them."""
 
 import shutil
 from pathlib import Path

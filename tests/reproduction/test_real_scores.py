@@ -245,7 +245,7 @@ def test_half_the_error_everywhere_is_twice_as_exact_without_doubt(walk):
 
 
 def test_the_correlation_of_a_first_order_process_is_its_closed_form():
-    """Of x[k] = a x[k-1] + noise it is (1 + a) / (1 - a); of independent errors 1."""
+    """It is (1 + a) / (1 - a) of x[k] = a x[k-1] + noise, and 1 of independent errors."""
     rng = np.random.default_rng(2)
     for a in (0.0, 0.5, 0.8):
         x = np.empty(60_000)

@@ -1,4 +1,4 @@
-"""What rendering costs and is worth: errors in closed form, which variants, files, rows, figure."""
+"""Cost and worth of rendering: errors in closed form, which variants, files, rows, figure."""
 
 import importlib.util
 

@@ -44,7 +44,7 @@ def root(finished, tmp_path, monkeypatch):
 
 
 def text_of(html):
-    """What a person reads: no tags, no styles, no scripts."""
+    """Return the text that a person reads: no tags, no styles, no scripts."""
     html = re.sub(r"(?s)<(style|script)\b.*?</\1>", "", html)
     return " ".join(unescape(re.sub(r"<[^>]*>", " ", html)).split())
 

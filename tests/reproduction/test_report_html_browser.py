@@ -46,7 +46,7 @@ def page(tmp_path_factory):
 
 
 def asked(page, tmp_path, probe):
-    """What a script of ours finds on the page, which must leave the console empty."""
+    """Return what a script of ours finds on the page, which must leave the console empty."""
     found, console = answer(page.read_text(), tmp_path, SCRIPT.replace("PROBE", probe))
     assert [line for line in console if "ReadPixels" not in line] == []  # we are slow, not the page
     return found

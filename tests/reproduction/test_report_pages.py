@@ -1,4 +1,4 @@
-"""What people read of the results: LaTeX, summary, and the assistance table."""
+"""Texts about the results: LaTeX, summary, and the assistance table."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""What a run cost, from the measurements of its jobs, and what it ran on."""
+"""Cost of a run, from the measurements of its jobs, and what it ran on."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What a person sees of a run: one line with the time left, and what went wrong."""
+"""Display of a run: one line with the time left, and what went wrong."""
 
 import heapq
 import importlib.util

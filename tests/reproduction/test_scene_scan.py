@@ -1,4 +1,4 @@
-"""How procedural scenes become scans: grids, light, rounding, warping, holes, textures."""
+"""Scans of procedural scenes: grids, light, rounding, warping, holes, textures."""
 
 from itertools import pairwise
 

@@ -119,7 +119,7 @@ def test_wrong_verdicts_are_rare(n_seeds, most):
 
 
 def test_without_the_spread_over_seeds_most_verdicts_of_one_run_could_not_be_trusted():
-    """What the borrowed deviation is for: limits over the test paths alone miss the truth often."""
+    """The borrowed deviation is needed: limits over the test paths alone miss the truth often."""
     rng = np.random.default_rng(5)
     hits = 0
     for _ in range(400):

@@ -39,7 +39,7 @@ def first_hits(corners_m, origin_m, directions):
 
 
 class Truth:
-    """What each pixel of a perspective camera shows, and which pixels are beyond doubt.
+    """Points that the pixels of a perspective camera show, and which pixels are beyond doubt.
 
     Attributes:
         face: Triangle (H, W) on the ray through the pixel's centre, -1 for none.

@@ -54,7 +54,7 @@ def camera(width: int, height: int, focal_change: float = 1.0) -> CameraConfig:
 
 @dataclass(frozen=True)
 class Shots:
-    """What was seen: photographs (N, H, W, 3), depth (N, h, w) in metres, 0 for none, poses."""
+    """A capture: photographs (N, H, W, 3), depth (N, h, w) in metres, 0 for none, poses."""
 
     rgb: NDArray[np.uint8]
     depth_m: NDArray[np.float32]
@@ -174,7 +174,7 @@ def scannet(folder: Path) -> Array:
 
 
 def transforms(folder: Path) -> Array:
-    """Of nerfstudio: OpenGL's camera, its own depth units, an entry that a frame overrides."""
+    """Write as nerfstudio: OpenGL's camera, its own depth units, an entry overridden by a frame."""
     seen = shots()
     one = camera(WIDTH, HEIGHT)
     frames = []

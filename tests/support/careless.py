@@ -1,4 +1,4 @@
-"""What a hasty person types: one table for all commands, and the files that get in the way."""
+"""Mistakes of a hasty person: one table for all commands, and the files that get in the way."""
 
 import shutil
 
@@ -113,7 +113,7 @@ def make_folder(folder, mesh, data_set, model):
 
 
 def arguments_of(name, value):
-    """What is typed for a row of the table."""
+    """Return the words typed for a row of the table."""
     command, option, _ = TABLE[name]
     words = [value if word == "{}" else word for word in command.split()]
     if not option:

@@ -122,7 +122,7 @@ def rows_where(results, **keys):
 
 
 def write_speed(root, scene, frames_per_s):
-    """How fast a scene was collected, part by part."""
+    """Speeds of collecting a scene, part by part."""
     speed = {"width": 640, "height": 480, "processor": "Abacus 9", "cores": 2}
     path = root / "scenes" / scene / "collection_speed.json"
     write_json(path, speed | {"frames_per_s": frames_per_s})

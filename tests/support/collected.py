@@ -48,7 +48,7 @@ def tree_of(directory):
 
 
 def refused(capfd, *arguments):
-    """What a command says when it refuses, on one line and with status 1."""
+    """Return a command's refusal, on one line and with status 1."""
     capfd.readouterr()
     assert main([str(argument) for argument in arguments]) == 1
     return only_error(capfd)

@@ -143,7 +143,7 @@ def write_table(path, poses):
 
 
 def write_localized(path, poses):
-    """What ``synfeal localize`` writes."""
+    """Write as ``synfeal localize`` does."""
     quat = Rotation.from_matrix(poses[:, :3, :3]).as_quat(scalar_first=True)
     rows = np.concatenate([poses[:, :3, 3], quat], axis=1).tolist()
     lines = [

@@ -40,7 +40,7 @@ class TooSlow(BaseException):
 
 @dataclass(frozen=True)
 class Damage:
-    """What stands in place of a file."""
+    """Content that stands in place of a file."""
 
     label: str  # how it was made
     content: bytes | None = None  # None for nothing at all
@@ -48,7 +48,7 @@ class Damage:
 
 
 def damages(data, others, seed, n_flips=40):
-    """What can happen to any file."""
+    """Damages of any file."""
     middle = len(data) // 2
     yield Damage("missing")
     yield Damage("a directory", special="directory")
@@ -72,7 +72,7 @@ def damages(data, others, seed, n_flips=40):
 
 
 def text_damages(data, separator):
-    """What can happen to a table: its lines, its columns, and the cells of its second line."""
+    """Damages of a table: its lines, its columns, and the cells of its second line."""
     lines = data.decode().splitlines()
     middle = len(lines) // 2
     changed = {
@@ -132,7 +132,7 @@ def places(value, place=(), ends_alone=False):
 
 
 def at(value, place):
-    """What stands at a place."""
+    """Return what stands at a place."""
     return reduce(getitem, place, value)
 
 
@@ -201,7 +201,7 @@ def little_memory():
 
 
 def problem_with(read, is_valid, names, folder=None):
-    """What is wrong with how a reader took an input; None if nothing is.
+    """Return what is wrong with a reader's answer to an input; None if nothing is.
 
     It may give a value that ``is_valid``, or refuse in a line that says one of ``names``, and then
     leave nothing in ``folder``.

@@ -72,7 +72,7 @@ def write_photographs(folder, paint, poses, camera=PHOTO, lens=None):
 
 
 def bent(image, camera, lens):
-    """What a lens makes of a pinhole image; OpenCV puts the first pixel's centre at (0, 0)."""
+    """Distort a pinhole image as a lens does; OpenCV puts the first pixel's centre at (0, 0)."""
     matrix = camera.intrinsics.matrix(-0.5)
     column, row = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     pixel = np.stack([column, row], axis=-1).reshape(-1, 1, 2).astype(np.float64)

@@ -1,4 +1,4 @@
-"""What property tests share: how many examples they take, and what they draw."""
+"""Settings of property tests, and the values they draw."""
 
 import os
 

@@ -53,7 +53,7 @@ def failed_metrics(size):
 
 
 def references(size):
-    """What the mean pose and the true poses score, and the number of frames."""
+    """Return the scores of the mean pose and the true poses, and the number of frames."""
     baseline = {f"baseline_{m}": v for m, v in zip(MEASURES, (1.1, 70.0, 1.0, 60.0), strict=True)}
     counts = dict(zip(("n_train", "n_test"), FRAMES[size], strict=True))
     return {**baseline, "floor_position_m": 0.25, "floor_orientation_deg": 15.0, **counts}

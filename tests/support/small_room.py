@@ -107,7 +107,7 @@ PYOPENGL_WARNS = "ignore::DeprecationWarning:OpenGL.*"
 
 
 def opener_of(name):
-    """How a backend is opened with the default settings."""
+    """Return the opener of a backend with the default settings."""
     return lambda mesh, camera: choose.BACKENDS[name](mesh, camera, RenderConfig())
 
 

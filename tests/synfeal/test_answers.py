@@ -1,4 +1,4 @@
-"""What functions answer to wrong calls: in keywords from Python, in flags on the command line."""
+"""Answers to wrong calls: in keywords from Python, in flags on the command line."""
 
 import ast
 import inspect

@@ -24,7 +24,7 @@ def folder(mesh, calm, tmp_path_factory):
 
 
 def problem_with(arguments, names, capfd):
-    """What is wrong with how a command took its arguments; None if nothing is."""
+    """Return what is wrong with a command's answer to its arguments; None if nothing is."""
     capfd.readouterr()
     try:
         with at_most(SECONDS), warnings.catch_warnings():

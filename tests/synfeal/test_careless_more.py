@@ -23,7 +23,7 @@ def folder(mesh, calm, tmp_path_factory):
 
 
 def problems_of(commands, folder, capfd):
-    """What is wrong with how commands ended, each with words of which its line must have one."""
+    """Return what is wrong with the ends of commands, each with words its line must have one of."""
     before, found = tree(folder), []
     for typed, words in commands:
         problem = problem_with(shlex.split(typed), words.split("|"), capfd)

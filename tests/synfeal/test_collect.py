@@ -160,7 +160,7 @@ def test_a_preview_shows_two_sets_side_by_side(damaged, tmp_path, monkeypatch, c
 
 
 def texts(notebook):
-    """What each cell of code says: printed, or its value."""
+    """Return the output of each cell of code: printed, or its value."""
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
     said = [[o.get("text") or o.data.get("text/plain", "") for o in c.outputs] for c in cells]
     return ["".join(parts).split(" at 0x")[0] for parts in said]
@@ -191,7 +191,7 @@ def test_the_functions_make_what_the_command_makes(mesh, calm, tmp_path):
 
 
 def loaded_by(code, among):
-    """Which of some modules a fresh interpreter has loaded after some code."""
+    """Return those of some modules that a fresh interpreter has loaded after some code."""
     code = f"{code}\nimport sys; print(*sorted({among!r} & set(sys.modules)))"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return run.stdout.strip()

@@ -1,4 +1,4 @@
-"""What a plan covers, against closed forms of boxes."""
+"""Coverage of a plan, against closed forms of boxes."""
 
 import numpy as np
 import pytest

@@ -19,7 +19,7 @@ LENS = (0.1, -0.05, 0.001, -0.002, 0.01)
 
 
 class Exported(NamedTuple):
-    """What a reader of a format finds: pinhole, poses, colour and depth images by frame."""
+    """Findings of a format's reader: pinhole, poses, colour and depth images by frame."""
 
     project: Callable  # points in the camera (x, y, z) to pixels
     cam_from_world: list

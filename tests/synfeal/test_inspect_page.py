@@ -178,7 +178,7 @@ class Reply(HTTPServer):
 
 
 def answer(page, folder, script):
-    """What a script, put at the end of a page, sends to ``REPLY``, and what the console says."""
+    """Return what a script at the end of a page sends to ``REPLY``, and the console's lines."""
     head, _, tail = page.rpartition("</script>")
     path, profile = folder / "page.html", f"--user-data-dir={folder / 'profile'}"
     with Reply() as reply:

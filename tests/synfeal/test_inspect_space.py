@@ -255,7 +255,7 @@ def test_sizes_that_are_not_metres_are_doubted(extents, unit_m, words):
 
 @pytest.mark.parametrize(("side", "taken"), [(6000.0, 0.001), (6e7, 1.0), (4.0, 1.0), (0.004, 1e3)])
 def test_a_unit_is_assumed_only_where_it_makes_a_room(tmp_path, side, taken):
-    """Of 60,000 km no unit does: then nothing is assumed, and no advice contradicts it."""
+    """No unit makes a room of 60,000 km: then nothing is assumed, and no advice contradicts it."""
     trimesh.creation.box((side, side, 0.6 * side)).export(tmp_path / "box.ply")
     scene = PlaceConfig(mesh=tmp_path / "box.ply").scene
     scene, mesh, notes = load_as_meant(scene, unit_is_given=False)

@@ -131,7 +131,7 @@ def collected(tmp_path_factory):
 
 
 def points_m(data, row):
-    """What the pixels (H, W) of a training frame show in the world, by its depth."""
+    """Return the world points (H, W, 3) of a training frame's pixels, by its depth."""
     camera = data.camera
     column, line = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     fx, fy, cx, cy = camera.intrinsics

@@ -1,4 +1,4 @@
-"""What glTF 2.0 allows: honoured by every renderer and in what is saved, or named."""
+"""All that glTF 2.0 allows: honoured by every renderer and in what is saved, or named."""
 
 import numpy as np
 import pytest

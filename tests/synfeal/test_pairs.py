@@ -493,7 +493,7 @@ def test_depths_that_differ_by_five_percent_are_alike_as_far_as_is_told(
 
 
 def test_pixels_without_depth_show_nothing_and_are_not_counted(tmp_path):
-    """Of the left half, in both ways in which a file says so."""
+    """Cover the left half, in both ways in which a file says so."""
     pose = before_wall([0, 0, 0])
     half = wall_mm(pose)
     half[:24, :32], half[24:, :32] = 0, 65535

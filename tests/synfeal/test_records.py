@@ -1,4 +1,4 @@
-"""What every stage leans on: whole files or none, tables, seeds by name, reasons in words."""
+"""Ground of every stage: whole files or none, tables, seeds by name, reasons in words."""
 
 import io
 import json

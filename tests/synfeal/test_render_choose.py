@@ -1,4 +1,4 @@
-"""Which backend draws: failures are injected, and one process really cannot load EGL."""
+"""Choice of the backend: failures are injected, and one process really cannot load EGL."""
 
 import importlib
 import logging
@@ -30,7 +30,7 @@ GREEN = TexturedMesh((facing_quad(2.0, 9.0, base_color=colored((0, 255, 0))),))
 
 @pytest.fixture(autouse=True)
 def forget():
-    """What worked is remembered for the process; not from one test to the next."""
+    """Forget after each test what worked in this process."""
     yield
     choose.why_not.cache_clear()
     choose.fastest_working.cache_clear()

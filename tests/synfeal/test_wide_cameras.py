@@ -96,7 +96,7 @@ def test_points_ahead_appear_where_opencv_projects_them(camera):
 
 
 def test_a_lens_may_see_behind_itself():
-    """Of an equidistant lens radii are angles: 135 degrees are 3/4 pi focal lengths."""
+    """Radii of an equidistant lens are angles: 135 degrees are 3/4 pi focal lengths."""
     focal = 50.0 / np.radians(110.0)
     behind = np.array([[1.0, 0.0, -1.0], [0.0, -1.0, -1.0], [0.0, 0.0, 1.0]])
     reach = focal * 0.75 * np.pi

@@ -1,4 +1,4 @@
-"""What a person reads: refusals in our own words, how far a command is, that it was ended."""
+"""Lines for a person: refusals in our own words, progress, and the end of a command."""
 
 import errno
 import os

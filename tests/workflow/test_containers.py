@@ -112,7 +112,7 @@ def test_the_papers_design_is_planned_for_slurm(tmp_path):
 
 
 def held_mb(build, px, batch_size):
-    """What a training step holds: weights, gradients and two moments, and the layers' outputs."""
+    """Memory of a training step: weights, gradients and two moments, and the layers' outputs."""
     outputs = []
 
     def note(_, __, out):  # a recurrent layer gives its sequence first

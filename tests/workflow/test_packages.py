@@ -35,7 +35,7 @@ def built(folder, out, *kind):
 
 @pytest.fixture(scope="session")
 def checkout(tmp_path_factory):
-    """What git tracks, and nothing else, without git."""
+    """Copy what git tracks, and nothing else, without git."""
     folder = tmp_path_factory.mktemp("checkout")
     files = tracked("")
     archive = subprocess.run(

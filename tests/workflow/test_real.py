@@ -149,7 +149,7 @@ def named_poses(photographs):
 
 
 def median_error_m(poses, truth, localized=False):
-    """Of a file of poses, by its columns alone."""
+    """Measure a file of poses by its columns alone."""
     table = pd.read_csv(poses)
     if localized:
         table = table[table.status == "localized"]

@@ -127,7 +127,7 @@ def made_by(*names):
 
 
 def measured_by(*names):
-    """What Snakemake measured of every job of these rules."""
+    """List the measurements that Snakemake made of every job of these rules."""
     return [
         file
         for name in names

@@ -128,7 +128,7 @@ def cluster(action: str, folder: Path) -> None:
 
 
 def _lines(*command: str) -> list[str]:
-    """What a command of SLURM's lists; nothing when the controller is too busy to answer."""
+    """Return what a command of SLURM's lists; nothing when the controller is too busy to answer."""
     listing = subprocess.run((*command, "--noheader"), stdout=subprocess.PIPE, text=True)
     return listing.stdout.splitlines()
 

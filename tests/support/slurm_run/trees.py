@@ -1,4 +1,4 @@
-"""What results hold: which files are promised to be the same, and which differ in two trees."""
+"""Contents of results: which files are promised to be the same, and which differ in two trees."""
 
 from __future__ import annotations
 
