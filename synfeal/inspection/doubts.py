@@ -98,7 +98,7 @@ def _unit_advice(extents_m: Array, unit_m: float) -> str:
     units = [f"{unit:g}" for unit in units_of_a_room(extents_m / unit_m)]
     if units:
         named = " or ".join([", ".join(units[:-1]), units[-1]] if units[1:] else units)
-        return f"the unit is probably wrong; try `unit_m={named}`"
+        return f"the unit is probably wrong; try `unit_m` {named}"
     if extents_m.max() > EXTENTS_M[1]:
         return (
             "in no usual unit is that a room. If it is terrain or a town, all is well, but for"
