@@ -62,7 +62,7 @@ class Trainee:
         print(localizer, file=self._process.stdin, flush=True)
         answer = self._process.stdout.readline()
         if not answer:
-            raise InputError(f"{self.commit}: this code could not train; what it said stands above")
+            raise InputError(self.commit, "this code could not train; what it said stands above")
         return float(answer)
 
     def end(self) -> None:

@@ -46,7 +46,7 @@ TRAIN_S = 120.0
 # Depth is drawn of the full mesh for every frame anyway; choosing less of it for colours takes
 # longer than a thousand frames save.
 DETAIL: Literal["full"] = "full"
-USUAL_FRAMES = 300  # of a capture
+USUAL_FRAMES = 300  # frames of a capture
 # The network of the default size is off by 5 to 10 per cent of the extent of the cameras: 12 cm in
 # a kitchen of 3 m, 3 m in a corridor of 30 m, where the map is off by 3 cm.
 LEARNABLE_M = 8.0

@@ -1,4 +1,4 @@
-"""What to expect of a place: pictures of known pose, localized in its map."""
+"""Check of a place: pictures of known pose, localized in its map."""
 
 from __future__ import annotations
 

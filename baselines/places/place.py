@@ -27,7 +27,7 @@ class Place:
 
     @property
     def record(self) -> Path:
-        """What the place is of, and what was measured."""
+        """Record of the place: its source, and what was measured."""
         return self.folder / RECORD
 
     @property
@@ -52,7 +52,7 @@ class Place:
 
     @property
     def map(self) -> Path:
-        """What photographs are localized in."""
+        """Map that photographs are localized in."""
         return self.folder / "map"
 
     @property

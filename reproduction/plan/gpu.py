@@ -33,13 +33,13 @@ SCHEMA = {
 
 
 class TableHours(NamedTuple):
-    """What training for one table, or for all of them, takes on one card.
+    """Time that training for one table, or for all of them, takes on one card.
 
     Attributes:
         name: Name of the table.
         runs: Training runs.
         images: Images shown.
-        seconds: Of the runs whose rate was measured.
+        seconds: Time of the runs whose rate was measured.
         unknown: Images of the others.
     """
 

@@ -43,7 +43,7 @@ HEIF_SUFFIXES = (".heic", ".heif")
 HEIF_BRANDS = (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1")
 HEIF = "HEIF"
 HEIF_REMEDY = "pip install 'synfeal[heic]', or convert to JPEG"
-MOST_FILE_BYTES = 2**30  # of an image; more than its pixels take, stored plainly
+MOST_FILE_BYTES = 2**30  # per image: more than its pixels take, stored plainly
 # A frame of nearly one colour: every so many rows and columns are looked at, and so many of their
 # pixels are within so many grey levels of the median.
 LOOKED_AT, SAME, ONE_COLOR = 4, 2, 0.95

@@ -107,7 +107,7 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     if status.st_size > most_bytes:
         size_mb, most_mb = status.st_size / 1e6, most_bytes / 1e6
         raise ValueError(f"it has {size_mb:.0f} MB, and more than {most_mb:.3g} MB are not read")
-    return path.read_bytes()  # of a directory, the system says what is wrong
+    return path.read_bytes()  # the system says what is wrong with a directory
 
 
 def read_json(path: Path) -> Any:

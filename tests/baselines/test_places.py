@@ -60,7 +60,7 @@ def room_from_cam():
 
 
 def localized(file: Path):
-    """Which photographs (N) were localized, and the poses of those."""
+    """Return which photographs (N) were localized, and the poses of those."""
     table = pd.read_csv(file)
     found = (table["status"] == "localized").to_numpy()
     values = table.loc[found, ["tx", "ty", "tz", "qw", "qx", "qy", "qz"]].to_numpy(float)

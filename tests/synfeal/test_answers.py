@@ -85,7 +85,10 @@ def test_an_error_is_told_in_flags(error, line, wording):
 ROOT = Path(__file__).parents[2]
 # Modules that are no command and hold flags, with the reason.
 ON_COMMAND_LINES = {
+    "baselines/training/sharing.py": "options of nvidia-smi",
     "reproduction/config/collected.py": "comments of the profile that a command prints",
+    "reproduction/plan/gpu.py": "a text that a command prints, which is no function",
+    "reproduction/plan/plan.py": "a text that a command prints, which is no function",
     "reproduction/real/config.py": "options of commands that a rule runs",
     "reproduction/real/down.py": "an option of a command that a rule runs",
     "reproduction/runs/job.py": "answers of jobs, which the command line of Snakemake starts",

@@ -286,7 +286,7 @@ def test_plain_and_open_meshes_are_doubted_and_a_flat_floor_is_a_floor():
 
 
 @pytest.mark.parametrize(
-    ("turn", "words"), [((0, 1, 2), ""), ((0, 2, 1), "--up-axis"), ((2, 1, 0), "turn the mesh")]
+    ("turn", "words"), [((0, 1, 2), ""), ((0, 2, 1), "`up_axis`"), ((2, 1, 0), "turn the mesh")]
 )
 def test_the_largest_floor_tells_the_up_axis(turn, words):
     room = trimesh.creation.box((8.0, 6.0, 3.0))  # its floor has 48 m², its walls 18 and 24
