@@ -8,6 +8,7 @@ All of these put the centre of the first pixel at (0, 0), as OpenCV does.
 | ROS's ``CameraInfo`` | ``k`` or ``K``, ``width``, ``height`` | ``sensor_msgs/CameraInfo`` |
 | RealSense | ``ppx``, ``ppy``, ``fx``, ``fy`` | librealsense, Projection |
 | ORB-SLAM | ``Camera.fx``, in version 3 ``Camera1.fx`` | its ``Examples`` |
+| stella_vslam | ``Camera`` with ``fx`` and ``cols`` | its documentation, Parameters |
 | Open3D | ``intrinsic_matrix``, by columns | ``PinholeCameraIntrinsic`` |
 | VINS, camodocal | ``projection_parameters`` | camodocal, ``CameraFactory`` |
 """
@@ -38,7 +39,13 @@ REALSENSE_LENS = (  # in the order of ``rs2_distortion``
     "brown conrady",
     "kannala brandt4",
 )
-ORBSLAM_LENS = {"pinhole": PERSPECTIVE, "rectified": PERSPECTIVE, "kannalabrandt8": FISHEYE}
+ORBSLAM_LENS = {
+    "pinhole": PERSPECTIVE,
+    "rectified": PERSPECTIVE,
+    "perspective": PERSPECTIVE,
+    "kannalabrandt8": FISHEYE,
+    "fisheye": FISHEYE,
+}
 UNDISTORT = "undistort the images first, and give the calibration of those"
 
 
@@ -65,6 +72,8 @@ def as_opencv(values: Values) -> Values:
         return _of_kalibr(values, "")
     if "ppx" in values and "ppy" in values:
         return _of_realsense(values)
+    if isinstance(values.get("Camera"), Mapping):
+        values = {f"Camera.{key}": value for key, value in values["Camera"].items()}
     for prefix in ("Camera1.", "Camera."):
         if f"{prefix}fx" in values:
             return _of_orbslam(values, prefix)
@@ -148,12 +157,13 @@ def _of_realsense(values: Values) -> Values:
 
 
 def _of_orbslam(values: Values, prefix: str) -> Values:
-    kind = str(values.get("Camera.type", "PinHole"))
+    kind = str(values.get("Camera.type", values.get("Camera.model", "PinHole")))
     if kind.lower() not in ORBSLAM_LENS:
         raise ValueError(f"Camera.type: '{kind[:40]}' is not read; {UNDISTORT}")
     lens = ORBSLAM_LENS[kind.lower()]
     names = ("k1", "k2", "k3", "k4") if lens == FISHEYE else ("k1", "k2", "p1", "p2", "k3")
-    width, height = (values.get(f"Camera.{side}") for side in ("width", "height"))
+    width = values.get("Camera.width", values.get("Camera.cols"))
+    height = values.get("Camera.height", values.get("Camera.rows"))
     if width is None or height is None:
         raise ValueError(
             "Camera.width: missing, as in the files of ORB-SLAM 2; add Camera.width and"

@@ -144,6 +144,27 @@ projection_parameters:
    cx: {CX}
    cy: {CY}
 """
+STELLA = f"""\
+Camera:
+  name: "EuRoC monocular"
+  setup: "monocular"
+  model: "perspective"
+  fx: {FX}
+  fy: {FY}
+  cx: {CX}
+  cy: {CY}
+  k1: {K1}
+  k2: {K2}
+  p1: {P1}
+  p2: {P2}
+  k3: 0.0
+  fps: 20.0
+  cols: {WIDTH}
+  rows: {HEIGHT}
+  color_order: "Gray"
+Feature:
+  scale_factor: 1.2
+"""
 
 
 def realsense(model, coeffs):
@@ -168,6 +189,7 @@ FILES = {
     ),
     "open3d-poses.json": (json.dumps({"parameters": [{"intrinsic": OPEN3D}] * 2}), NONE),
     "vins.yaml": (VINS, LENS),
+    "stella.yaml": (STELLA, LENS),
 }
 FISHEYES = {
     "kalibr.yaml": KALIBR_WIDE,
