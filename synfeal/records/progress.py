@@ -144,7 +144,7 @@ def at_work(name: str, what: str) -> Iterator[None]:
     done, began_s = threading.Event(), time.monotonic()
 
     def tell() -> None:
-        while not done.wait(EVERY_S):
+        while not done.wait(min(EVERY_S, threading.TIMEOUT_MAX)):
             seconds = time.monotonic() - began_s
             print(f"{name}: {what}, {seconds:.0f} s so far", file=sys.stderr, flush=True)
 
