@@ -175,7 +175,8 @@ def test_photographs_with_exif_need_nothing_else_in_a_place_of_a_mesh(meshed, tm
     photos.mkdir()
     film_mm, diagonal_mm = 26, float(np.hypot(36.0, 24.0))
     focal_px = film_mm * np.hypot(WIDTH, HEIGHT) / diagonal_mm
-    phone = CameraConfig(width=WIDTH, height=HEIGHT, fx=focal_px, fy=focal_px)
+    centre = {"cx": WIDTH / 2, "cy": HEIGHT / 2}
+    phone = CameraConfig(width=WIDTH, height=HEIGHT, fx=focal_px, fy=focal_px, **centre)
     exif = Image.Exif()
     exif.get_ifd(ExifTags.IFD.Exif)[ExifTags.Base.FocalLengthIn35mmFilm] = film_mm
     poses = room_from_cam()
