@@ -165,7 +165,7 @@ def meshed(tmp_path_factory) -> Path:
     """A place of a mesh that somebody else made."""
     folder = tmp_path_factory.mktemp("meshed")
     save_glb(folder / "room.glb", furnished_room((4.0, 12.0, 40.0)))
-    words = ["build", str(folder / "room.glb"), "--out", str(folder / "place"), "--frames", "120"]
+    words = ["build", str(folder / "room.glb"), "--out", str(folder / "place"), "--frames", "60"]
     assert main([*words, "--width", "160"]) == 0
     return folder / "place"
 
@@ -192,9 +192,9 @@ def test_photographs_with_exif_need_nothing_else_in_a_place_of_a_mesh(meshed, tm
 
 def test_the_report_of_a_mesh_speaks_of_renderings(meshed):
     check = json.loads((meshed / "place.json").read_text())["check"]
-    assert (check["kind"], check["pictures"]) == ("renderings", 30)
+    assert (check["kind"], check["pictures"]) == ("renderings", 15)
     page = (meshed / "report.html").read_text()
-    assert "of 30 renderings of the mesh" in page
+    assert "of 15 renderings of the mesh" in page
     assert "The scan beside photographs" not in page
 
 
