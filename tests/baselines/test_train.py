@@ -293,7 +293,13 @@ def test_sequences_below_a_folder_are_read_with_either_kind_of_file(tmp_path, su
 def test_one_path_leaves_nothing_to_hold_out_and_is_learned_from(calm, tmp_path, capsys):
     given = ["train", calm, "--out", tmp_path / "out", "--images", 64, "--device", "cpu"]
     assert main([str(argument) for argument in given]) == 0
-    assert "nothing was held out" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "24 frames on 1 paths" in said
+    assert said.splitlines()[0].endswith("degrees on 8 test frames")
+    (tmp_path / "alone").symlink_to(write_photographs(tmp_path / "flat", 1))
+    given = ["train", tmp_path / "alone", "--out", tmp_path / "one", "--images", 64]
+    assert main([*map(str, given), "--device", "cpu"]) == 0
+    assert "nothing was held out, so its error is not known" in capsys.readouterr().out
 
 
 def test_minutes_settle_the_images_once(photographs, tmp_path):
