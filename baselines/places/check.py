@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from baselines.references.localized import FOUND, localize_in_map
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import PosedFrames
+from synfeal.errors import InputError
 from synfeal.geometry.poses import pose_error, pose_from_quat
 
 Array = NDArray[np.float64]
@@ -86,14 +88,18 @@ def check_of(place: Place, known: Known) -> dict[str, Any]:
         Counts; medians and 90 % of the errors of the pictures that were localized; the share of all
         that are within 5 cm and 5 degrees; for each picture its known position and its error, None
         where it was not localized.
+
+    Raises:
+        InputError: The file names other pictures.
     """
-    table = pd.read_csv(place.check).set_index("image").loc[[str(file) for file in known.files]]
+    table = pd.read_csv(place.check)
+    truth = known.world_from_cam[_rows_of(table["image"], known, place)]
     found = (table["status"] == FOUND).to_numpy()
     position_m, angle_deg = np.full(len(table), np.inf), np.full(len(table), np.inf)
     if found.any():
         values = table.loc[found, ["tx", "ty", "tz", "qw", "qx", "qy", "qz"]].to_numpy(np.float64)
         poses = pose_from_quat(values[:, :3], values[:, 3:])
-        error_m, error_rad = pose_error(poses, known.world_from_cam[found])
+        error_m, error_rad = pose_error(poses, truth[found])
         position_m[found], angle_deg[found] = error_m, np.degrees(error_rad)
     close = (position_m <= CLOSE_M) & (angle_deg <= CLOSE_DEG)
     return {
@@ -109,9 +115,25 @@ def check_of(place: Place, known: Known) -> dict[str, Any]:
                 "position_m": pose[:3, 3].round(3).tolist(),
                 "error_m": round(float(error), 4) if np.isfinite(error) else None,
             }
-            for pose, error in zip(known.world_from_cam, position_m, strict=True)
+            for pose, error in zip(truth, position_m, strict=True)
         ],
     }
+
+
+def _rows_of(images: Iterable[str], known: Known, place: Place) -> list[int]:
+    """Find the pictures that the lines of ``check.csv`` name, wherever the place was then."""
+    row = {_ending(file): index for index, file in enumerate(known.files)}
+    try:
+        return [row[_ending(image)] for image in images]
+    except KeyError as error:
+        raise InputError(
+            place.check, f"names {error.args[0]}, which is not tried here", "delete it, build again"
+        ) from error
+
+
+def _ending(path: str | Path) -> str:
+    """Return the folder and the name of a picture, which are unique in a place."""
+    return "/".join(Path(path).parts[-2:])
 
 
 def _percentile(values: Array, percent: float) -> float | None:
