@@ -80,7 +80,7 @@ def __getattr__(name: str) -> Any:
     if name in __all__:
         return getattr(import_module(ELSEWHERE.get(name, "synfeal.api")), name)
     if not name.startswith("_"):
-        for command in import_module("synfeal.cli").added_commands():
+        for command in import_module("synfeal.cli.parser").added_commands():
             if command.name == name and command.function is not None:
                 return resolve_name(command.function)
     raise AttributeError(f"module 'synfeal' has no attribute '{name}'")
