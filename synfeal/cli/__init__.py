@@ -1,6 +1,6 @@
 """The command ``synfeal``.
 
-Nothing is imported here that takes long: until :func:`main` runs, Ctrl-C would be a traceback.
+Nothing is imported here that takes long, so that :mod:`synfeal.cli.program` is soon reached.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ import io
 import sys
 from collections.abc import Sequence
 
-from synfeal.errors import exit_status
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; return 0, 1 for what a person can fix, 2 for wrong usage, 130 after Ctrl-C."""
+    from synfeal.errors import exit_status
+
     if isinstance(sys.stdout, io.TextIOWrapper):
         # What a terminal has no letter for is written by its number; the work is not lost by it.
         sys.stdout.reconfigure(errors="backslashreplace")

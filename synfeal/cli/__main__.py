@@ -2,7 +2,7 @@
 
 import sys
 
-from synfeal.cli import main
+from synfeal.cli.program import main
 
 if __name__ == "__main__":
     sys.exit(main())

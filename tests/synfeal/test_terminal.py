@@ -10,13 +10,24 @@ import pytest
 from synfeal.cli import main, parser
 from synfeal.records import progress
 
-LIBRARIES = ("argparse", "numpy", "pydantic", "PIL", "scipy", "yaml", "trimesh")
+LIBRARIES = ("argparse", "dataclasses", "numpy", "pydantic", "PIL", "scipy", "yaml", "trimesh")
 
 
 def test_nothing_slow_is_imported_before_ctrl_c_is_handled():
-    code = f"import sys, synfeal.cli; print([n for n in {LIBRARIES} if n in sys.modules])"
+    code = f"import sys, synfeal.cli.program; print([n for n in {LIBRARIES} if n in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_ctrl_c_before_anything_is_begun_is_one_line():
+    code = (
+        "import os, signal\nfrom synfeal.cli import program\n"
+        "os.kill(os.getpid(), signal.SIGINT)\n"  # as during the imports that follow
+        "program.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 130
+    assert done.stderr == "error: interrupted; nothing was begun\n"
 
 
 def test_ctrl_c_while_libraries_are_imported_is_one_line(monkeypatch, capsys):
