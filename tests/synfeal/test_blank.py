@@ -64,8 +64,8 @@ def test_one_colour_is_named_with_what_was_left_out_on_reading(rgb):
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (millimetres, ["room.glb", "100% of the pixels", "far_m (100 m)", "--unit-m"]),
-        (kilometres, ["room.glb", "near_m (0.05 m)", "--unit-m"]),
+        (millimetres, ["room.glb", "100% of the pixels", "far_m (100 m)", "--unit"]),
+        (kilometres, ["room.glb", "near_m (0.05 m)", "--unit"]),
         (one_grey, ["room.glb", "one colour"]),
         (obj_without_its_mtl, ["room.obj", "one colour", ".mtl"]),
     ],
@@ -101,7 +101,7 @@ def test_collect_always_says_how_many_pixels_are_empty(mesh, warns, tmp_path, ca
 def test_what_helps_against_empty_pixels_is_not_what_was_given(tmp_path, caplog, monkeypatch):
     monkeypatch.setattr("synfeal.collection.run.WARN_ABOVE", 0.005)
     path, box = save(tmp_path / "room.glb", open_room()), ["-2.5", "2.5", "-2", "2", "-0.5", "0.5"]
-    for more, remedy in (([], "--min-seen 0.9"), (["--min-seen", "0.9"], "--pitch")):
+    for more, remedy in (([], "`min_seen=0.9`"), (["--min-seen", "0.9"], "`pitch_deg`")):
         caplog.clear()
         command = ["collect", str(path), "--box", *box, *SMALL, *more]
         assert main([*command, "--out", str(tmp_path / f"set{len(more)}")]) == 0
@@ -113,7 +113,7 @@ def test_what_helps_against_empty_pixels_is_not_what_was_given(tmp_path, caplog,
 @pytest.mark.parametrize(
     ("frames", "words"),
     [
-        (("--frames", "20"), ["20 training frames lie on one straight path", "--spacing"]),
+        (("--frames", "20"), ["20 training frames lie on one straight path", "`spacing_m`"]),
         (("--frames", "60", "--spacing", "0.8"), []),
         (("--frames", "20", "--mode", "random"), []),
     ],

@@ -123,7 +123,7 @@ def test_focal_length_of_depth_for_colour_is_told_and_mended(
     assert mended["camera"]["color"]["fx"] == pytest.approx(COLOR_PX, rel=0.01)
     caplog.clear()
     assert run_scan(sequence, tmp_path / "kept.glb", *wrong, "--keep-calibration") == 0
-    assert f"give --color-focal {COLOR_PX:.0f}" in caplog.text
+    assert f"give `color_focal_px={COLOR_PX:.0f}`" in caplog.text
     kept, right = record_of(tmp_path / "kept.glb"), record_of(scanned)
     assert kept["camera"]["color"]["fx"] == DEPTH_PX
     disagreement = [r["color_disagreement"]["given"] for r in (kept, right)]
@@ -375,7 +375,7 @@ def test_real_sequence(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None
     # What its folder says of both cameras is true of the depth camera.
     files = ["--color-focal", "585", "--depth-focal", "585", "--keep-calibration"]
     assert main([*asked, *files, "--out", str(wrong)]) == 0
-    assert "585 px was given for colour: give --color-focal 52" in caplog.text
+    assert "585 px was given for colour: give `color_focal_px=52" in caplog.text
     right_record, wrong_record = record_of(out), record_of(wrong)
     # Other code, another scan of this room: up is 26.6 degrees from the first frame's upper edge.
     up = np.array(right_record["sequence_from_world"])[:3, 2]
