@@ -303,9 +303,9 @@ def _check(job: TrainJob) -> None:
     own = (MODEL, HISTORY, RECORD, *TEMPORARY)
     present = sorted(p.name for p in job.out.glob("*")) if job.out.is_dir() else []
     left = [name for name in present if name.startswith(".") and _is_left(name)]
-    refuse_foreign(job.out, (*own, *left), "synfeal train")
     for dataset in job.datasets:
         refuse_inside(job.out, dataset)
+    refuse_foreign(job.out, (*own, *left), "synfeal train")
 
 
 def _refuse_useless(job: TrainJob, sets: Sequence[OwnFrames]) -> None:

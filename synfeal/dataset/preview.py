@@ -62,13 +62,14 @@ def write_preview(
         )
     if out.exists():
         raise InputError(out, "exists", "delete it or choose another file with `out`")
+    found = [read_split_frames(dataset, split) for dataset in datasets]
+    for frames in found:
+        _refuse_among_frames(out, frames.sequences)
     refuse_unwritable(out)
     if write is _write_mp4:
-        encoder()  # missing, it is to be missed before any frame is read
+        encoder()  # missing, it is to be missed before any image is read
     columns = []
-    for dataset in datasets:
-        frames = read_split_frames(dataset, split)
-        _refuse_among_frames(out, frames.sequences)
+    for dataset, frames in zip(datasets, found, strict=True):
         for name in show:
             layer = PICTURES[name]
             if name != "color" and not any(s.numbers[layer.kind] for s in frames.sequences):

@@ -48,7 +48,7 @@ COMMANDS = (
     (f"{COLLECT} --min-seen nan", "--min-seen"),
     (f"{COLLECT} --unit 1e-9", "--unit"),
     (f"{COLLECT} --unit 1e-4", "room.glb"),
-    (f"{COLLECT} --unit 1e6", "unit_m"),
+    (f"{COLLECT} --unit 1e6", "--unit"),
     (f"{COLLECT} --seed 1.5", "--seed"),
     (f"{COLLECT} --seed 0x10", "--seed"),
     (f"{COLLECT} --cores two", "--cores"),
@@ -86,7 +86,7 @@ COMMANDS = (
     (f"{COLLECT} --out photos/a.png/b", "photos/a.png"),
     # inspect
     ("inspect photos/a.png", "photos/a.png"),
-    ("inspect set", "MESH"),
+    ("inspect config", "MESH"),
     ("inspect absent.glb", "MESH: absent.glb"),
     ("inspect room.glb --out room.glb", "room.glb"),
     ("inspect room.glb --out set", "set"),
