@@ -71,7 +71,11 @@ def capture_formats() -> dict[str, CaptureFormat]:
                 "install its package again, or remove it",
             ) from error
         if not isinstance(other, CaptureFormat):
-            raise InputError(f"entry point {entry.name} of {GROUP}", "is no CaptureFormat")
+            raise InputError(
+                f"entry point {entry.name} of {GROUP}",
+                f"{entry.value} is no CaptureFormat",
+                "name one after a colon, as in my_captures.cart:FORMAT",
+            )
         if other.name in found:
             raise InputError(
                 f"entry point {entry.name} of {GROUP}", f"a format {other.name} is there already"

@@ -127,8 +127,26 @@ def build_scene(builder: str, seed: int) -> TexturedMesh:
     Args:
         builder: Name of the scene among the entry points of :data:`BUILDERS`.
         seed: Seed of the scene.
+
+    Raises:
+        InputError: The entry point does not load, names no function, or its function returns no
+            textured mesh.
     """
-    mesh: TexturedMesh = entry_points(group=BUILDERS)[builder].load()(builder, seed)
+    entry = entry_points(group=BUILDERS)[builder]
+    where = f"entry point {builder} of {BUILDERS}"
+    try:
+        build = entry.load()
+    except (ImportError, AttributeError) as error:
+        raise InputError(
+            where, f"does not load ({error})", "install its package again, or remove it"
+        ) from error
+    if not callable(build):
+        raise InputError(
+            where, f"{entry.value} is no function", "name one after a colon, as in sheds:build"
+        )
+    mesh = build(builder, seed)
+    if not isinstance(mesh, TexturedMesh):
+        raise InputError(where, f"returned a {type(mesh).__name__}, not a TexturedMesh")
     return mesh
 
 

@@ -8,8 +8,10 @@ import pytest
 import trimesh
 from pydantic import ValidationError
 
+from synfeal.collection.prepare import build_scene
 from synfeal.config.collection import SceneConfig
 from synfeal.config.load import describe
+from synfeal.errors import InputError
 
 MODULE = """
 import numpy as np
@@ -21,6 +23,10 @@ def build(name, seed):
     box = trimesh.creation.box((4.0 + seed, 3.0, 2.0))
     rgb = np.random.default_rng(seed).integers(0, 256, (len(box.vertices), 3), np.uint8)
     return TexturedMesh((MeshPart(name, box.vertices, box.faces[:, ::-1], vertex_rgb=rgb),))
+
+
+def box(name, seed):
+    return trimesh.creation.box()
 """
 BUILDS = """
 from pathlib import Path
@@ -63,3 +69,20 @@ def test_an_unknown_name_is_refused_with_those_that_are_installed():
     assert said.startswith("builder: must be a builder that is installed: ")
     assert "large_room" in said
     assert "found 'shed'" in said
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("nowhere:build", "does not load .*nowhere"),
+        ("sheds:make", "does not load .*make"),
+        ("sheds", "sheds is no function; .*sheds:build"),
+        ("sheds:box", "returned a Trimesh, not a TexturedMesh"),
+    ],
+)
+def test_an_entry_point_that_is_no_builder_is_refused(value, said, site, monkeypatch):
+    entries = site / "sheds-1.0.dist-info" / "entry_points.txt"
+    entries.write_text(f"[synfeal.scene_builders]\nshed = {value}\n")
+    monkeypatch.syspath_prepend(site)
+    with pytest.raises(InputError, match=f"entry point shed of synfeal.scene_builders: {said}"):
+        build_scene("shed", 0)
