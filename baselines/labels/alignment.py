@@ -39,7 +39,8 @@ def fit(labels: Array, truth: Array, alignment: Alignment) -> Similarity:
     mean_m, true_mean_m = turned_m.mean(axis=0), true_m.mean(axis=0)
     scale, square = 1.0, float(((turned_m - mean_m) ** 2).sum())
     if alignment == "similarity" and square > 0:
-        scale = float(((turned_m - mean_m) * (true_m - true_mean_m)).sum()) / square
+        shared = float(((turned_m - mean_m) * (true_m - true_mean_m)).sum())
+        scale = max(shared / square, 0.0)  # a negative one would be a reflection
     return Similarity(scale, rotation, true_mean_m - scale * mean_m)
 
 

@@ -75,12 +75,14 @@ def nearest_rows(train: PoseTable, test: PoseTable) -> NDArray[np.int64]:
     Returns:
         Rows (N,) of ``train``.
     """
-    squares = np.square(train.position_m).sum(axis=1)
-    found = []
+    middle_m = train.position_m.mean(axis=0)  # squares lose their digits far from the origin
+    train_m = train.position_m - middle_m
+    squares = np.square(train_m).sum(axis=1)
+    found = [np.empty(0, np.int64)]
     for start in range(0, len(test), CHUNK):
-        position_m = test.position_m[start : start + CHUNK]
-        square = np.square(position_m).sum(axis=1)[:, None] + squares
-        distance_m = np.sqrt(np.maximum(square - 2 * position_m @ train.position_m.T, 0))
+        test_m = test.position_m[start : start + CHUNK] - middle_m
+        square = np.square(test_m).sum(axis=1)[:, None] + squares
+        distance_m = np.sqrt(np.maximum(square - 2 * test_m @ train_m.T, 0))
         cosine = np.abs(test.quat_wxyz[start : start + CHUNK] @ train.quat_wxyz.T)
         angle_rad = 2 * np.arccos(np.minimum(cosine, 1))
         found.append(np.argmin(distance_m + METRES_PER_RADIAN * angle_rad, axis=1))

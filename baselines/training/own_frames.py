@@ -319,7 +319,9 @@ def _frame_camera(camera: CameraConfig) -> FrameCamera:
 def pack_own_frames(
     sets: Sequence[OwnFrames], photographs: PhotographCamera, network: NetworkConfig, out: Path
 ) -> PackedFrames:
-    """Write ``frames.npy``, ``frames.json`` and ``labels.csv`` of one or more data sets.
+    """Write ``frames.npy`` and ``labels.csv`` of one or more data sets.
+
+    And ``frames.json``, where the camera of all is known.
 
     Photographs are turned upright as EXIF says, and their poses with them: so are those that will
     be localized.

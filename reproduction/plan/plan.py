@@ -20,7 +20,7 @@ from synfeal.records.tables import write_frame
 NOTES = """\
 measured    {measured}
 CPU time    of a core like theirs; the sum is meant to be within a factor of 1.5 (docs/cost.md)
-wall time   rule after rule, a job on each core
+wall time   at least: rule after rule, all work on all cores, or the longest job on one
 x measured  largest planned job over largest measured one; far above 1 is extrapolated
 training    on these cores; on a GPU: --gpu
 """
@@ -97,6 +97,7 @@ def _costs(files: Files, paces: pd.DataFrame, cores: int) -> pd.DataFrame:
 
 
 def _by_rule(files: Files, paces: pd.DataFrame, cores: int) -> pd.DataFrame:
+    """Sum the costs of jobs by rule; ``wall_s`` is the least that it can take on the cores."""
     jobs = jobs_of(files)
     jobs["cpu_s"] = seconds_of(jobs, paces)
     jobs["times_measured"] = jobs["cost"] / jobs["pace"].map(paces["largest"])

@@ -207,14 +207,21 @@ PARTS: dict[str, Callable[[Path], str]] = {
 
 
 def rewritten(text: str, part: Callable[[str, str], str]) -> str:
-    """Replace the generated parts of a page by ``part``, called with name and profile."""
-    pattern = re.compile(r"<!-- (\w+) (\w+) -->.*?<!-- /\1 -->", re.DOTALL)
+    """Replace the generated parts of a page by ``part``, called with name and profile.
+
+    Raises:
+        InputError: A part has no end.
+    """
+    start = r"<!-- (\w+) (\w+) -->"
 
     def fresh(found: re.Match[str]) -> str:
         name, profile = found.groups()
         return f"<!-- {name} {profile} -->\n\n{part(name, profile)}\n\n<!-- /{name} -->"
 
-    return pattern.sub(fresh, text)
+    page, n_parts = re.subn(rf"{start}.*?<!-- /\1 -->", fresh, text, flags=re.DOTALL)
+    if n_parts != len(re.findall(start, text)):
+        raise InputError("a generated part of a page has no end; close it with <!-- /NAME -->")
+    return page
 
 
 def part_of(name: str, profile: str) -> str:

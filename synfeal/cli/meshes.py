@@ -269,12 +269,16 @@ def scan_text(out: Path, record: Mapping[str, Any]) -> str:
     """Describe what was made of how many frames, and how near it comes to photographs."""
     color, photographs = record["camera"]["color"], record["photographs"]
     agreement, disagreement = record["depth_agreement"], record["color_disagreement"]
-    depth = "not compared" if agreement is None else f"{agreement:.0%} agree"
+    depth = "not compared"
+    if agreement is not None:
+        depth = (
+            f"{agreement:.0%} agree, best at a focal length of {record['depth_best_focal_px']:.0f}"
+            f" px ({record['camera']['depth']['fx']:.0f} px used)"
+        )
     between = "photographs between the fused ones" if photographs["held_out"] else "photographs"
     return (
         f"{out}: {record['faces']:,} triangles from {record['frames']['fused']} frames\n"
-        f"depth and poses: {depth}, best at a focal length of {record['depth_best_focal_px']:.0f}"
-        f" px ({record['camera']['depth']['fx']:.0f} px used)\n"
+        f"depth and poses: {depth}\n"
         f"photographs: disagree by {disagreement['given']:.3f} as given, {disagreement['best']:.3f}"
         f" at the best; used {color['fx']:.1f} px, centre ({color['cx']:.1f}, {color['cy']:.1f})\n"
         f"renderings: {photographs['difference']:.1f} grey levels from {photographs['compared']}"

@@ -229,8 +229,8 @@ def refuse_effects(
     """Refuse effects that cannot be drawn with the other settings.
 
     Raises:
-        ValueError: One cannot; the message begins with its key below that of the effects, or with
-            the camera's ``stereo_baseline_m``.
+        ValueError: One cannot; the message begins with its key below ``render``, as in
+            ``effects.light.states``, or with the camera's ``stereo_baseline_m``.
     """
     if render.effects is None:
         return

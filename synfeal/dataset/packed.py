@@ -32,8 +32,9 @@ def new_packed(out: Path, n_frames: int, input_px: int) -> Iterator[NDArray[np.u
     shape = (n_frames, input_px, input_px, 3)
     with atomic_path(out) as temporary:
         frames = np.lib.format.open_memmap(temporary, mode="w+", dtype=np.uint8, shape=shape)
-        with temporary.open("r+b") as file:  # else a full disk kills the process that fills a page
-            os.posix_fallocate(file.fileno(), 0, temporary.stat().st_size)
+        if hasattr(os, "posix_fallocate"):  # else a full disk kills the process that fills a page
+            with temporary.open("r+b") as file:
+                os.posix_fallocate(file.fileno(), 0, temporary.stat().st_size)
         yield frames
         frames.flush()
 

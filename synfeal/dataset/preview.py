@@ -7,6 +7,7 @@ import math
 import shutil
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -108,7 +109,8 @@ def encoder() -> str:
     if found is None and importlib.util.find_spec("imageio_ffmpeg") is not None:
         from imageio_ffmpeg import get_ffmpeg_exe
 
-        found = get_ffmpeg_exe()
+        with suppress(RuntimeError):  # a wheel without the program
+            found = get_ffmpeg_exe()
     if found is None:
         raise InputError(
             Argument("out"),

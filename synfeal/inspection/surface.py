@@ -69,6 +69,8 @@ def _rgba(part: MeshPart, corners: NDArray[np.int64], weight: Array) -> Array:
     rgba = np.full((len(corners), 4), 255.0)
     if part.texture is not None and part.uv is not None:
         uv = np.einsum("nc,ncd->nd", weight, part.uv[corners])
+        below_1 = np.nextafter(1.0, 0.0)  # the last texel; at 1 the texture begins again
+        uv = np.where(part.clamped_uv, np.clip(uv, 0.0, below_1), uv)
         texel = nearest_texels(part.texture, uv)
         rgba[:, : texel.shape[1]] = texel
     elif part.vertex_rgb is not None:

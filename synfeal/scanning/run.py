@@ -318,7 +318,9 @@ def _record(
         "max_depth_m": job.max_depth_m,
         "gravity": gravity,
         "depth_agreement": None if np.isnan(agreement.share) else agreement.share,
-        "depth_best_focal_px": best_focal_px(agreement.sample, camera.depth),
+        "depth_best_focal_px": (
+            None if np.isnan(agreement.share) else best_focal_px(agreement.sample, camera.depth)
+        ),
         "color_disagreement": fit.record,
         "photographs": {
             "compared": len(compared),

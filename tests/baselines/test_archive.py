@@ -15,7 +15,6 @@ import pytest
 from baselines.labels.batches import link_images
 from baselines.labels.rgbd.frames import frame_generator
 from synfeal.cli import main
-from synfeal.dataset import frame_files as archive_module
 from synfeal.dataset.depth import read_depth_m
 from synfeal.dataset.frame_files import ArchivedFile, foreign_members, frame_file, write_archive
 from synfeal.dataset.packed import pack_frames
@@ -158,10 +157,9 @@ def test_damage_ends_in_one_line(packed, tmp_path, damage, message, capsys):
     assert "Traceback" not in "".join(errors)
 
 
-def test_a_member_that_says_it_is_huge_is_not_read(packed, monkeypatch):
-    monkeypatch.setattr(archive_module, "MOST_BYTES", 100)
+def test_a_member_that_says_it_is_huge_is_not_read(packed):
     with pytest.raises(OSError, match="too many for such a file"):
-        ArchivedFile(packed / "seq-01.zip", "frame-000000.color.png").read_bytes()
+        ArchivedFile(packed / "seq-01.zip", "frame-000000.color.png").read_bytes(most_bytes=100)
     with pytest.raises(FileNotFoundError, match=r"seq-01\.zip/frame-000099\.color\.png"):
         ArchivedFile(packed / "seq-01.zip", "frame-000099.color.png").read_bytes()
 

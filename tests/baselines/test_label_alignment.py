@@ -82,3 +82,15 @@ def test_each_sequence_is_aligned_on_its_own():
 def test_labels_that_stand_still_keep_their_scale():
     still = np.repeat(line()[:1], 5, axis=0)
     assert fit(still, line()[:5], "similarity").scale == 1.0
+
+
+def test_a_reflection_is_no_motion():
+    rng = np.random.default_rng(0)
+    truth = line()
+    truth[:, :3, 3] = rng.normal(size=(N_FRAMES, 3))
+    mirrored = truth.copy()
+    mirrored[:, :3, 3] *= -1.0  # in a point, with the cameras as they were
+    assert fit(mirrored, truth, "similarity").scale == 0.0
+    position_m, _ = aligned_errors([(table_of(mirrored), table_of(truth))], "similarity")
+    expected_m = np.linalg.norm(truth[:, :3, 3] - truth[:, :3, 3].mean(axis=0), axis=1)
+    np.testing.assert_allclose(position_m, expected_m, rtol=1e-9)

@@ -91,6 +91,10 @@ def test_the_most_alike_and_the_nearest_are_those_of_a_full_search():
     angles = rotation_angle_rad(test.quat_wxyz[:, None], train.quat_wxyz[None])
     expected = np.argmin(cost + METRES_PER_RADIAN * angles, axis=1)
     assert (nearest_rows(train, test) == expected).all()
+    # Nor does it matter how far from the origin they are.
+    far_m = np.array([5e6, -4e6, 300.0])
+    moved = [replace(table, position_m=table.position_m + far_m) for table in (train, test)]
+    assert (nearest_rows(*moved) == expected).all()
 
 
 def test_matches_are_those_of_a_naive_search():

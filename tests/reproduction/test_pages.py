@@ -99,6 +99,11 @@ def test_parts_are_replaced_and_nothing_else():
     assert rewritten(once, lambda name, profile: f"\\1 {name} of {profile}") == once
 
 
+def test_a_part_without_an_end_is_refused():
+    with pytest.raises(InputError, match="has no end"):
+        rewritten("<!-- x mini -->\nold\n", lambda *_: "")
+
+
 def test_the_headline_is_of_the_largest_profile_published(root):
     assert headline() == "mini"
     shutil.copytree(root, root.with_name("night"))

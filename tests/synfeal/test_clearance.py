@@ -121,12 +121,12 @@ def test_without_a_clearance_plans_stay_as_they_were():
 
 def test_a_clearance_no_camera_can_keep_is_named():
     scene = SCENE.model_copy(update={"min_clearance_m": 5.0})
-    with pytest.raises(InputError, match=r"keeps min_clearance_m \(5\.0 m\) from surfaces"):
+    with pytest.raises(InputError, match=r"keeps `min_clearance_m` \(5\.0 m\) from surfaces"):
         plan_mesh(furnished(), "room", scene, COLLECTION, 9, np.random.default_rng(0), "train")
 
 
 def test_a_dead_end_names_the_clearance_among_what_may_be_lowered():
     scene = SCENE.model_copy(update={"min_clearance_m": 0.2})
     collection = COLLECTION.model_copy(update={"max_tries": 3, "min_path_m": 50.0})
-    with pytest.raises(InputError, match=r"or min_clearance_m \(0\.2 m\)"):
+    with pytest.raises(InputError, match=r"or `min_clearance_m` \(0\.2 m\)"):
         plan_mesh(furnished(), "room", scene, collection, 1, np.random.default_rng(0), "train")

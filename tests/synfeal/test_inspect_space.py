@@ -3,6 +3,7 @@
 import itertools
 import re
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -222,6 +223,15 @@ def test_points_are_spread_by_area_and_carry_the_texture():
     assert (points.rgb[left] == [255, 0, 0]).all()
     assert (points.rgb[~left] == [0, 0, 255]).all()
     assert (points.is_drawn == left).all()
+
+
+def test_a_texture_that_is_clamped_does_not_begin_again_beyond_its_edge():
+    texture = texture_of(2, 2, 3)
+    texture[:, 0], texture[:, 1] = [255, 0, 0], [0, 0, 255]
+    part = square(2.0, texture)
+    beyond = replace(part, uv=part.uv + np.array([1.0, 0.0]), clamped_uv=(True, False))
+    points = SurfacePoints.of(TexturedMesh((beyond,)), np.random.default_rng(0), 100)
+    assert (points.rgb == [0, 0, 255]).all()
 
 
 def doubts(extents, **values):

@@ -207,3 +207,9 @@ def test_sees_stops_at_a_wall_but_not_before_it():
     origins = np.tile([0.0, 0.1, 0.2], (4, 1))
     targets = [[x, 0.1, 0.2] for x in (0.99, 1 - 2 * band, 1 + 2 * band, 1.01)]
     assert caster.sees(origins, targets).tolist() == [True, True, False, False]
+
+
+def test_a_point_that_is_not_finite_sees_nothing():
+    caster = RayCaster(WATERTIGHT["box"].vertices - 1.0, WATERTIGHT["box"].faces)
+    targets = np.array([[np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0], [0.0, 0.1, 0.0]])
+    assert caster.sees(np.zeros((3, 3)), targets).tolist() == [False, False, True]

@@ -40,7 +40,7 @@ def test_default_profile_plans_the_papers_tables(tmp_path):
     assert jobs["image_references"] == 20
     assert jobs["structure_references"] == 5  # true poses, SfM's, largest noise of three blocks
     assert jobs["table"] == 4
-    assert jobs["side_table"] == 8  # neither shapes of errors nor robustness
+    assert jobs["side_table"] == 7  # neither shapes of errors nor robustness
     assert not jobs.keys() & {"adjusted_references", "coordinate_references", "train_varied"}
 
 
@@ -56,7 +56,7 @@ def test_the_complete_profile_adds_our_own_tables(tmp_path):
     assert jobs["descriptors"] == jobs["features"] == jobs["views"] == 2
     assert jobs["correspondences"] == jobs["tracks"] == jobs["robustness"] == 1
     assert jobs["table"] == 6
-    assert jobs["side_table"] == 10
+    assert jobs["side_table"] == 9
 
 
 @pytest.fixture(scope="module")
