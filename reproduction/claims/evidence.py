@@ -91,7 +91,7 @@ class Evidence:
         """Return a result file that the design makes, and note it as used."""
         path = self.root / relative
         if not path.is_file():
-            raise InputError(path, "missing", "make the results again")
+            raise InputError(f"{path}: missing; make the results again")
         self.used[relative] = None
         return path
 
@@ -166,7 +166,7 @@ class Evidence:
         _, columns, measures = SCORES[self.score]
         table = read_errors(path, columns)
         if not np.array_equal(table["frame"], test.poses.frame):
-            raise InputError(path, "its frames are not those of the test set", REMEDY)
+            raise InputError(f"{path}: its frames are not those of the test set; {REMEDY}")
         return [medians(table[m].to_numpy(), test.path, test.counts) for m in measures]
 
     def test_set(self, scene: str, size: str) -> TestSet:

@@ -98,7 +98,7 @@ class Claim:
     """One claim as printed."""
 
     id: str  # ``C1`` to ``C16``
-    section: str  # section of the paper
+    section: str  # of the paper
     group: str  # of ``GROUPS``
     statement: str  # the claim in our words
     published: str  # its figures, as printed
@@ -173,8 +173,8 @@ class Thresholds(NamedTuple):
     # Percent. The paper prints 0.01 m, 5 % of its median cell, 0.20 m: it resolves no less.
     smallest: float = 5.0
     enough: float = 2 / 3  # share of the published effect that replicates it
-    few: float = 1 / 3  # share of the batches (C4)
-    not_coping: float = 1 / 2  # share of the batches (C15)
+    few: float = 1 / 3  # of the batches (C4)
+    not_coping: float = 1 / 2  # of the batches (C15)
 
 
 RULE = Thresholds()
@@ -197,7 +197,7 @@ class Condition(NamedTuple):
 
     name: str  # in the reason of the verdict
     effect: Array  # sample, percent, positive in the claimed direction
-    layout: Layout  # layout of the sample
+    layout: Layout  # of the sample
     published: float = 0.0  # its size in print, percent; 0 where the paper claims a direction alone
     is_order: bool = False  # by however little: no effect is too small
 

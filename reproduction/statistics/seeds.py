@@ -52,7 +52,7 @@ class Group(NamedTuple):
     """Runs that move together: the repetitions of one localizer."""
 
     n_seeds: int
-    degrees_of_freedom: float  # those of the standard deviation
+    degrees_of_freedom: float  # of their standard deviation
     borrowed: bool = False  # a single run, whose deviation is that of published runs
 
     @property
@@ -72,7 +72,7 @@ class Borrowed(NamedTuple):
 class Layout:
     """Places of the parts of a sample."""
 
-    resamples: int  # resamples of the test paths
+    resamples: int  # of the test paths
     groups: tuple[Group, ...] = ()  # in the order of their seed rows
 
     @property
@@ -157,7 +157,7 @@ def seed_variance(sample: Array, layout: Layout) -> tuple[float, float]:
         if group.borrowed:
             own = float(values[0] - values[1]) ** 2 / 4
         elif group.n_seeds > 1:
-            own = (group.n_seeds - 1) * float(values.var())  # the jackknife's
+            own = (group.n_seeds - 1) * float(values.var())  # of the jackknife
         else:
             continue
         variance += own

@@ -88,8 +88,8 @@ def test_a_photograph_without_pose_is_told(tmp_path, capfd):
     assert "frame-000004.pose.txt: missing" in refused(capfd, "evaluate", folder, poses)
 
 
-def test_a_tum_sequence_is_left_to_its_own_tools(tmp_path, capfd):
+def test_a_tum_sequence_without_images_is_named(tmp_path, capfd):
     for name in ("rgb.txt", "groundtruth.txt"):
         (tmp_path / name).write_text("# empty\n")
     poses = write_estimates(tmp_path / "poses.csv", [("frame-000003.color.jpg", 3)])
-    assert "evo" in refused(capfd, "evaluate", tmp_path, poses)
+    assert "rgb.txt: lists no images" in refused(capfd, "evaluate", tmp_path, poses)
