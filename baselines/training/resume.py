@@ -123,9 +123,13 @@ class RandomState:
 
 @contextmanager
 def stop_signals() -> Iterator[Callable[[], bool]]:
-    """Hold SIGTERM and SIGINT back, so that no step is cut in two; says whether one has come.
+    """Hold SIGTERM and SIGINT back, so that no step is cut in two.
 
-    It takes its usual effect when the block ends; the block is never left as if it had not come.
+    The first one takes its usual effect when the block ends; the block is never left as if none had
+    come.
+
+    Yields:
+        A function that tells whether one has come.
     """
     received: list[int] = []
     numbers = [n for n in (signal.SIGTERM, signal.SIGINT) if signal.getsignal(n) not in UNTOUCHED]

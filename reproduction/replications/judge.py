@@ -48,6 +48,7 @@ def part_verdict(part: Part, comparisons: int = 1) -> Verdict:
 
 
 def _region(low: float, high: float, smallest: float, enough: float, printed: bool) -> Verdict:
+    """Judge limits in percent, positive in the claimed direction, as ``claims.verdicts`` does."""
     if low >= enough and low > 0:
         return Verdict.HOLDS
     if high <= -smallest and high < 0:

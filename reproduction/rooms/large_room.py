@@ -138,7 +138,7 @@ def _floor(canvas: Canvas) -> Pixels:
 
 
 def _ceiling(canvas: Canvas) -> Pixels:
-    """Paint white mineral tiles, all alike; a water stain in one corner."""
+    """Paint white mineral tiles, all alike, with a water stain; x and y run against the world's."""
     x, y = canvas.coordinates_m()
     tiles = materials.plaster((0.84, 0.84, 0.81), 0.006, 0.004)(canvas)
     joint = np.minimum(np.abs((x + 0.3) % 0.6 - 0.3), np.abs((y + 0.3) % 0.6 - 0.3)) < 0.005
@@ -173,7 +173,7 @@ def _south_wall(make: Maker) -> Item:
 
 
 def _desks(make: Maker) -> Item:
-    """Build equal desks with two equal screens and a chair each, and an island with one."""
+    """Build equal desks with two equal screens and a chair each, and a table with one screen."""
     rng, screen = make.rng, furniture.monitor(make)
     screens = [screen.placed(dx, 0.18, 0.74) for dx in (-0.32, 0.32)]
     desk = joined(furniture.table(make, (1.4, 0.7, 0.74), BEECH), screens)

@@ -59,18 +59,21 @@ def rename_results(root: Path) -> int:
 
 
 def with_present_names(jobs: pd.DataFrame) -> pd.DataFrame:
-    """Rename measured jobs as they are called now.
+    """Give measured jobs the names that they have today.
+
+    An old run measured effects as the job of that name in the stage ``tables``, which becomes a
+    stage of its own. A run that has that stage already keeps the jobs of its tables.
 
     Args:
         jobs: Their ``stage`` and ``job``, such as ``render`` and ``large_room/groundtruth/seq-01``.
 
     Returns:
-        The same jobs. Effects were measured where their table was written, and are a stage since.
+        The same jobs, renamed.
     """
     renamed = jobs.assign(job=jobs["job"].str.replace(OLD, CAMERA, regex=False))
     if not (jobs["stage"] == EFFECTS).any():
-        measured = (jobs["stage"] == "tables") & (jobs["job"] == EFFECTS)
-        renamed.loc[measured, ["stage", "job"]] = EFFECTS, ""
+        is_old_effects = (jobs["stage"] == "tables") & (jobs["job"] == EFFECTS)
+        renamed.loc[is_old_effects, ["stage", "job"]] = EFFECTS, ""
     return renamed
 
 

@@ -221,7 +221,8 @@ def pairs_in_time(
         most_apart_s: Largest difference of a pair.
 
     Returns:
-        Indices (K,) of both series.
+        Indices (K,) of the reference, then of the estimate, in the order of the shorter series; an
+        entry of the longer one may stand in several pairs.
     """
     if len(estimate_s) > len(reference_s):
         estimate, reference = pairs_in_time(estimate_s, reference_s, most_apart_s)

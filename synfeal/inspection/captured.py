@@ -172,7 +172,10 @@ def frames_figure(capture: Capture) -> Figure:
 
 
 def path_figure(capture: Capture) -> Figure:
-    """Draw the path of the camera from above and from the side, with the way it looked."""
+    """Draw the path of the camera from above and from the side, with the way it looked.
+
+    Colours run from the first frame, dark, to the last, bright.
+    """
     right, forward, up = _axes_of(capture)
     position_m = capture.world_from_cam[:, :3, 3]
     looks = capture.world_from_cam[:, :3, 2]

@@ -139,7 +139,9 @@ def _shelves(sides: Ints) -> tuple[Ints, tuple[int, int]]:
 
 
 def _texels(charts: _Charts, part: MeshPart) -> tuple[Ints, Floats, Floats]:
-    """Find texels whose centres lie on a triangle or within half a texel of it.
+    """Find texels whose centres lie on a triangle or near it.
+
+    All within half a texel are found, and a few more beside short edges and sharp corners.
 
     Returns:
         Column and row (T, 2), the point of the triangle (T, 3) in metres, and its normal (T, 3).
