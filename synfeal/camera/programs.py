@@ -1,16 +1,15 @@
 """Calibrations of other programs, translated into the keys that OpenCV and ROS write.
 
-All of these put the centre of the first pixel at (0, 0), as OpenCV does.
+All of these put the centre of the first pixel at (0, 0), as OpenCV does. By program, with its
+source, the keys that tell its files:
 
-| program | told by | source |
-|---|---|---|
-| Kalibr, EuRoC | ``intrinsics`` and ``resolution``, Kalibr's below ``cam0`` | Kalibr's wiki |
-| ROS's ``CameraInfo`` | ``k`` or ``K``, ``width``, ``height`` | ``sensor_msgs/CameraInfo`` |
-| RealSense | ``ppx``, ``ppy``, ``fx``, ``fy`` | librealsense, Projection |
-| ORB-SLAM | ``Camera.fx``, in version 3 ``Camera1.fx`` | its ``Examples`` |
-| stella_vslam | ``Camera`` with ``fx`` and ``cols`` | its documentation, Parameters |
-| Open3D | ``intrinsic_matrix``, by columns | ``PinholeCameraIntrinsic`` |
-| VINS, camodocal | ``projection_parameters`` | camodocal, ``CameraFactory`` |
+- Kalibr, EuRoC (Kalibr's wiki): ``intrinsics`` and ``resolution``, Kalibr's below ``cam0``
+- ROS's ``CameraInfo`` (``sensor_msgs/CameraInfo``): ``k`` or ``K``, ``width``, ``height``
+- RealSense (librealsense, Projection): ``ppx``, ``ppy``, ``fx``, ``fy``
+- ORB-SLAM (its ``Examples``): ``Camera.fx``, in version 3 ``Camera1.fx``
+- stella_vslam (its documentation, Parameters): ``Camera`` with ``fx`` and ``cols``
+- Open3D (``PinholeCameraIntrinsic``): ``intrinsic_matrix``, by columns
+- VINS, camodocal (camodocal, ``CameraFactory``): ``projection_parameters``
 """
 
 from __future__ import annotations
