@@ -152,12 +152,13 @@ def test_every_problem_is_named(greenhouse):
         "14 missing textures hold no colour and are not needed",
         "'M_Plants_01': alpha-tested at 0.91",
         "'M_Vines_01': alpha-tested at 0.89",
+        "'M_Light_01': what it emits is not added to its colour",
         "'M_Light_01': texture converted from LA to 8-bit RGBA",
         "'M_Light_01': blended transparency becomes an alpha test at 0.5",
         "'Greenhouse_M_Light_01_0': nowhere opaque enough to be seen",
     ):
         assert words in findings
-    assert len(greenhouse.findings) == 8
+    assert len(greenhouse.findings) == 9
 
 
 def test_saved_and_read_again_it_looks_the_same(greenhouse, tmp_path):
