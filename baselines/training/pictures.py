@@ -17,10 +17,8 @@ from synfeal.records.files import refuse_unwritable
 
 SUFFIXES = (".png", ".jpg", ".jpeg", *HEIF_SUFFIXES)
 # Pictures of other programs, which people expect to be read.
-OTHER_SUFFIXES = (
-    *(".webp", ".tif", ".tiff", ".bmp", ".gif", ".avif", ".jxl", ".jp2"),
-    *(".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
-)
+RAW_SUFFIXES = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
+OTHER_SUFFIXES = (".webp", ".tif", ".tiff", ".bmp", ".gif", ".avif", ".jxl", ".jp2", *RAW_SUFFIXES)
 # Images of a frame beside the one that its pose is of.
 LAYERS = (DEPTH, NORMAL, MASK, RIGHT_COLOR, RIGHT_DEPTH)
 

@@ -40,7 +40,7 @@ class Orientation(IntEnum):
 
     @property
     def is_mirrored(self) -> bool:
-        """Whether the stored pixels are mirrored."""
+        """Tell whether the stored pixels are mirrored."""
         return "MIRRORED" in self.name
 
     @property
@@ -51,7 +51,7 @@ class Orientation(IntEnum):
 
     @property
     def swaps_sides(self) -> bool:
-        """Whether width and height change places."""
+        """Tell whether width and height change places."""
         return self.quarters % 2 == 1
 
     @property

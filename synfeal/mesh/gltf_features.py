@@ -44,8 +44,15 @@ WITHOUT_EFFECT = {
     *(f"MSFT_{name}" for name in ("packing_occlusionRoughnessMetallic", "audio_emitter")),
     *(f"MSFT_{name}" for name in ("packing_normalRoughnessMetallic", "lod")),
     *(f"AGI_{name}" for name in ("articulations", "stk_metadata")),
-    *("CESIUM_primitive_outline", "CESIUM_RTC", "FB_geometry_metadata", "GRIFFEL_bim_data"),
-    *("VRM", "VRMC_vrm", "VRMC_springBone", "VRMC_node_constraint", "OMI_collider"),
+    "CESIUM_primitive_outline",
+    "CESIUM_RTC",
+    "FB_geometry_metadata",
+    "GRIFFEL_bim_data",
+    "VRM",
+    "VRMC_vrm",
+    "VRMC_springBone",
+    "VRMC_node_constraint",
+    "OMI_collider",
 }
 # What an author sees and an image here does not, by extensions of materials.
 SEEN_THROUGH = {

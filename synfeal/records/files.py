@@ -203,7 +203,7 @@ def refuse_unwritable(out: Path) -> None:
     while not os.path.lexists(place):
         place = place.parent
     try:
-        probe = place / f"{unfinished_prefix('probe')}{secrets.token_hex(4)}"
+        probe = _unfinished(place / "probe")
         probe.open("xb").close()
         probe.unlink()
     except OSError as error:
@@ -272,7 +272,7 @@ def atomic_directory(path: Path, *, replace: bool = False) -> Iterator[Path]:
         refuse_existing(Path(path))
     path = _end_of_links(Path(path))
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{unfinished_prefix(path.name)}{secrets.token_hex(4)}")
+    temporary = _unfinished(path)
     temporary.mkdir()
     former = temporary.with_name(f"{temporary.name}-former")
     try:
