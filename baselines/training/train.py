@@ -193,15 +193,16 @@ def train(job: TrainJob) -> TrainedModel:
     settings = _settings(job, network)
     with at_work("train", "reading the data sets"):
         sets = Sets.read(job)
-        hashes = sets.sha256()
-    if (job.out / RECORD).exists():
-        return _finished(job, settings, hashes)
+        if (job.out / RECORD).exists():
+            return _finished(job, settings, sets.sha256())
     _refuse_useless(job, sets.learned)
     _refuse_what_does_not_fit(job, network, sum(len(own.color) for own in sets.learned), device)
     photographs = [own for own in (*sets.learned, *sets.test) if own.camera is None]
     refuse_mixed_sizes(job.photographs, (file for own in photographs for file in own.color))
     for own in sets.learned:
         check_posed_depth(own, job.photographs)
+    with at_work("train", "reading the data sets"):
+        hashes = sets.sha256()  # reads every image, so after all that refuses a run
     is_new = not job.out.exists()
     try:
         with writing_to(job.out, lambda: "run the same command again when that is mended"):

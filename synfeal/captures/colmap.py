@@ -22,7 +22,7 @@ from synfeal.dataset.images import image_size
 from synfeal.dataset.pose_models import NamedPose, colmap_images
 from synfeal.errors import InputError, read_as
 from synfeal.geometry.poses import inverse
-from synfeal.records.files import names_below
+from synfeal.records.files import names_below, read_text
 
 MODELS = ("", "sparse/0", "sparse", "colmap/sparse/0", "model")
 IMAGES = ("images", "rgb", "", "../images", "../../images")
@@ -100,7 +100,7 @@ def _cameras_of(file: Path, used: set[int]) -> dict[int, Calibration]:
 
 def _text_rows(file: Path) -> dict[int, list[str]]:
     """Read the lines of ``cameras.txt`` by the numbers of the cameras."""
-    lines = [line.split() for line in file.read_text(encoding="utf-8-sig").splitlines()]
+    lines = [line.split() for line in read_text(file, "utf-8-sig").splitlines()]
     return {int(cells[0]): cells for cells in lines if cells and not cells[0].startswith("#")}
 
 
