@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 import synfeal
 from baselines.places.place import Place
-from baselines.references.localized import FOUND, localize_in_map
+from baselines.references.localized import localize_in_map
+from baselines.references.map_localizer import FOUND
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.posed_sequence import PosedFrames

@@ -25,10 +25,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from synfeal.errors import Argument, InputError
+
 PATCHES_ACROSS = 16  # along the longer side of the map's frames
 LN10 = math.log(10.0)
 # One pose in a hundred with no more support than this is chance.
 LEAST_CONFIDENCE = 0.99
+
+
+def check_confidence(least: float) -> None:
+    """Refuse a least confidence that no pose, or every pose, has.
+
+    Raises:
+        InputError: It is not between 0 and 1.
+    """
+    if not 0 < least < 1:
+        raise InputError(
+            Argument("confidence"), f"must lie between 0 and 1, found {least:g}", "0.99 is usual"
+        )
 
 
 class Support(NamedTuple):
