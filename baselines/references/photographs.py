@@ -7,6 +7,7 @@ from the frames that look most alike, then from those that were taken nearest to
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ from baselines.references.confidence import LEAST_CONFIDENCE, NO_SUPPORT, Suppor
 from baselines.references.correspondences import mutual_matches
 from baselines.references.features import roots_of
 from baselines.references.mapped import VIEW_PX, StructureMap, detect, detector
-from baselines.references.structure import pinhole, refined_focal_px, supported_pose
+from baselines.references.structure import pinhole, refined_focal_px, refined_pose, supported_pose
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.distortion import distort, undistort
 from synfeal.camera.projection import cell_pixels, normalised_of_pixels
@@ -35,14 +36,14 @@ RETRIEVED = 20  # frames that a photograph is matched with, once its pose is nea
 # Those that look most alike: of a place that repeats itself, frames of each repeat must be there.
 FIRST_RETRIEVED = 40
 # Share of the inliers that a pose elsewhere has, from which nothing tells which of both is right.
-ALIKE = 0.8
-MOST_PLACES = 5  # that may look like what a photograph shows
+ALIKE = 0.75
+MOST_PLACES = 8  # that may look like what a photograph shows
 APART_M, APART_RAD = 0.3, np.radians(10.0)  # between poses of different places
 RATIO = 0.85
 MAX_ERROR_PX = 6.0  # in the map's frames; poses of a scan contradict each other by some pixels
 # Matches that miss by this many times the largest error of an inlier may miss because the focal
-# length is wrong.
-FOCAL_ERRORS = 2.0
+# length is wrong; by this many because the lens is not known.
+FOCAL_ERRORS, ROUGHLY = 2.0, 5.0
 SAMPLES = 4  # along each side of a pixel of what retrieval sees
 # How many metres a radian counts in "nearest": turning by 30 degrees changes what is seen about as
 # much as a step of a metre does.
@@ -97,7 +98,7 @@ class Rival(NamedTuple):
 
     Attributes:
         world_from_cam: Pose (4, 4) in the world of the map.
-        inliers: Features of the photograph that agree with it.
+        inliers: Features of the photograph that it explains by something else than the answer does.
     """
 
     world_from_cam: Array
@@ -155,48 +156,68 @@ class Finder:
 
     def find(self, photograph: Photograph) -> Answer:
         """Estimate where a photograph was taken."""
-        first = self._against(photograph, self.alike(photograph))
-        if first is None:
+        matched = _Matched(photograph, self._place, self._focal_px)
+        places = [self._settled(matched, attempt) for attempt in self._candidates(matched)]
+        if not places:
             return NOT_FOUND
-        attempts = [self._settled(photograph, attempt) for attempt in self._places(first)]
-        best = max(attempts, key=lambda attempt: attempt.support.inliers)
-        elsewhere = [
-            attempt
-            for attempt in attempts
+        best = max(places, key=lambda attempt: attempt.support.inliers)
+        rivals = [
+            Rival(attempt.world_from_cam, self._elsewhere(attempt, best))
+            for attempt in places
             if _are_apart(attempt.world_from_cam, best.world_from_cam)
         ]
-        rival = max(elsewhere, key=lambda attempt: attempt.support.inliers, default=None)
         return Answer(
             world_from_cam=best.world_from_cam,
             support=best.support,
             focal_ratio=self._focal_ratio(best),
-            rival=None if rival is None else Rival(rival.world_from_cam, rival.support.inliers),
+            rival=max(rivals, key=lambda rival: rival.inliers, default=None),
         )
 
-    def _settled(self, photograph: Photograph, attempt: _Attempt) -> _Attempt:
-        """Match the frames that were taken nearest to a pose too, and keep the better one."""
-        second = self._against(photograph, self.nearest(attempt.world_from_cam))
-        if second is None or _are_apart(second.world_from_cam, attempt.world_from_cam):
-            return attempt
-        better = second.support.log10_nfa < attempt.support.log10_nfa
-        return second if better else attempt
+    def _elsewhere(self, attempt: _Attempt, best: _Attempt) -> int:
+        """Count the features that an attempt explains by something else than the best one does.
 
-    def _places(self, first: _Attempt) -> list[_Attempt]:
-        """List the first pose and those that the rest of its matches agree on, elsewhere.
-
-        What is seen from one place matches features of all places that look like it.
+        Poses also differ because a lens bends lines or depth is wrong. Then both are based on the
+        same points, or on points that the best pose misses by little.
         """
-        found = [first]
-        left = ~first.inlier
-        while len(found) < MOST_PLACES:
-            other = self._agreed(first.own[left], first.pixel[left], first.point_m[left])
-            if other is None or other.support.confidence < LEAST_CONFIDENCE:
-                break
-            rows = np.flatnonzero(left)
-            left[rows[other.inlier]] = False
+        matches, inlier = attempt.matches, attempt.inlier
+        missed_px = self._missed_px(matches, best.world_from_cam)[inlier]
+        own, point_m = matches.own[inlier], matches.point_m[inlier]
+        other = best.mean_points_m(own)
+        apart_m = np.linalg.norm(point_m - other, axis=1)
+        is_elsewhere = np.where(
+            np.isfinite(apart_m), apart_m > APART_M, missed_px > ROUGHLY * MAX_ERROR_PX
+        )
+        return len(np.unique(own[is_elsewhere]))
+
+    def _candidates(self, matched: _Matched) -> list[_Attempt]:
+        """List poses at different places, those with most support first.
+
+        All matches together agree on one pose. Of a place that repeats itself they hold many, each
+        with a small share of the matches, which RANSAC misses; the matches with one frame are of
+        few repeats, mostly of one.
+        """
+        frames = self.alike(matched.photograph)
+        matches = matched.with_frames(frames)
+        first = self._agreed(matches)
+        by_frame = [self._agreed(matched.with_frames([frame])) for frame in frames]
+        poses = [attempt.world_from_cam for attempt in by_frame if attempt is not None]
+        others = [self._supported(matches, pose) for pose in poses]
+        others = [other for other in others if other.support.confidence >= LEAST_CONFIDENCE]
+        others.sort(key=lambda attempt: attempt.support.inliers, reverse=True)
+        found = [] if first is None else [first]
+        for other in others:
             if all(_are_apart(other.world_from_cam, known.world_from_cam) for known in found):
                 found.append(other)
-        return found
+        return found[:MOST_PLACES]
+
+    def _settled(self, matched: _Matched, attempt: _Attempt) -> _Attempt:
+        """Match the frames that were taken nearest to a pose too, and keep the better one."""
+        matches = matched.with_frames(self.nearest(attempt.world_from_cam))
+        second = self._agreed(matches)
+        if second is None or _are_apart(second.world_from_cam, attempt.world_from_cam):
+            second = self._refined(matches, attempt.world_from_cam)
+        better = second.support.log10_nfa < attempt.support.log10_nfa
+        return second if better else attempt
 
     def alike(self, photograph: Photograph) -> Rows:
         """List the frames of the map that look most alike, best first."""
@@ -213,72 +234,140 @@ class Finder:
         order: Rows = np.argsort(far, kind="stable")
         return order[:RETRIEVED]
 
-    def _against(self, photograph: Photograph, frames: Rows) -> _Attempt | None:
-        """Estimate a pose from matches with some frames of the map."""
-        features = self._place.features
-        own, feature = [], []
-        for frame in frames:
-            mine, other = mutual_matches(photograph.roots, features.roots(int(frame)), RATIO)
-            own.append(mine)
-            feature.append(features.start[frame] + other)
-        matched = np.concatenate(own)
-        pixel = photograph.slope[matched] * self._focal_px
-        point_m = self._place.point_m[np.concatenate(feature)]
-        return self._agreed(matched, pixel, point_m)
-
-    def _agreed(self, own: Rows, pixel: Array, point_m: Array) -> _Attempt | None:
-        """Estimate the pose that most matches agree with.
-
-        Args:
-            own: Feature of the photograph (m,) of each match.
-            pixel: Its position (m, 2) from the principal point.
-            point_m: Where it was matched to (m, 3), in the world of the map.
-        """
+    def _agreed(self, matches: _Matches) -> _Attempt | None:
+        """Estimate the pose that most matches agree with."""
         found = supported_pose(
-            pixel=pixel,
-            point_m=point_m,
+            pixel=matches.pixel,
+            point_m=matches.point_m,
             camera=self._pinhole,
             seed=self._seed,
             max_error_px=MAX_ERROR_PX,
         )
         if found is None:
             return None
+        return self._attempt(matches, found.world_from_cam, found.inlier)
+
+    def _refined(self, matches: _Matches, world_from_cam: Array) -> _Attempt:
+        """Refine a pose (4, 4) on the matches that agree with it."""
+        inlier = self._inliers(matches, world_from_cam)
+        refined = refined_pose(
+            pixel=matches.pixel,
+            point_m=matches.point_m,
+            world_from_cam=world_from_cam,
+            inlier=inlier,
+            camera=self._pinhole,
+        )
+        return self._supported(matches, refined)
+
+    def _supported(self, matches: _Matches, world_from_cam: Array) -> _Attempt:
+        """Count the matches that agree with a pose (4, 4)."""
+        return self._attempt(matches, world_from_cam, self._inliers(matches, world_from_cam))
+
+    def _inliers(self, matches: _Matches, world_from_cam: Array) -> NDArray[np.bool_]:
+        """Mark the matches (m,) that agree with a pose (4, 4)."""
+        return self._missed_px(matches, world_from_cam) < MAX_ERROR_PX
+
+    def _attempt(
+        self, matches: _Matches, world_from_cam: Array, inlier: NDArray[np.bool_]
+    ) -> _Attempt:
         camera = self._place.camera
         support = support_of(
-            pixel=pixel,
-            own=own,
-            inlier=found.inlier,
+            pixel=matches.pixel,
+            own=matches.own,
+            inlier=inlier,
             size=(camera.width, camera.height),
             max_error_px=MAX_ERROR_PX,
         )
-        return _Attempt(found.world_from_cam, support, own, pixel, point_m, found.inlier)
+        return _Attempt(world_from_cam, support, matches, inlier)
+
+    def _missed_px(self, matches: _Matches, world_from_cam: Array) -> Array:
+        """Compute by how much a pose (4, 4) misses matches (m,); infinity behind the camera."""
+        cam_from_world = inverse(world_from_cam)
+        in_cam_m = matches.point_m @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = in_cam_m[:, :2] / in_cam_m[:, 2:] * self._focal_px
+            missed_px = np.linalg.norm(seen - matches.pixel, axis=1)
+        return np.where(in_cam_m[:, 2] > 0, missed_px, np.inf)
 
     def _focal_ratio(self, attempt: _Attempt) -> float:
         """Estimate the best focal length over the given one, from matches that nearly agree."""
-        cam_from_world = inverse(attempt.world_from_cam)
-        in_cam_m = attempt.point_m @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            seen = in_cam_m[:, :2] / in_cam_m[:, 2:] * self._focal_px
-            near = np.linalg.norm(seen - attempt.pixel, axis=1) < FOCAL_ERRORS * MAX_ERROR_PX
-        near &= in_cam_m[:, 2] > 0
+        matches = attempt.matches
+        near = self._missed_px(matches, attempt.world_from_cam) < FOCAL_ERRORS * MAX_ERROR_PX
         focal_px = refined_focal_px(
-            pixel=attempt.pixel[near],
-            point_m=attempt.point_m[near],
+            pixel=matches.pixel[near],
+            point_m=matches.point_m[near],
             world_from_cam=attempt.world_from_cam,
             camera=self._pinhole,
         )
         return focal_px / float(self._focal_px[0])
 
 
-class _Attempt(NamedTuple):
-    """A pose, its support, and the matches (m,) it was found from."""
+class _Matches(NamedTuple):
+    """Matches of a photograph with features of the map.
 
-    world_from_cam: Array
-    support: Support
+    Attributes:
+        own: Feature of the photograph (m,) of each.
+        pixel: Its position (m, 2) from the principal point.
+        point_m: Where it was matched to (m, 3), in the world of the map.
+    """
+
     own: Rows
     pixel: Array
     point_m: Array
+
+
+class _Attempt(NamedTuple):
+    """A pose, its support, the matches (m,) it was found from, and which of them agree with it."""
+
+    world_from_cam: Array
+    support: Support
+    matches: _Matches
     inlier: NDArray[np.bool_]
+
+    def mean_points_m(self, own: Rows) -> Array:
+        """Average the points that agree with the pose, by feature of the photograph.
+
+        Args:
+            own: Features (k,).
+
+        Returns:
+            Points (k, 3) in the world; NaN where no match of the feature agrees.
+        """
+        known, point_m = self.matches.own[self.inlier], self.matches.point_m[self.inlier]
+        count = int(max(own.max(initial=-1), known.max(initial=-1))) + 1
+        sums = np.stack([np.bincount(known, axis, count) for axis in point_m.T], axis=1)
+        with np.errstate(invalid="ignore"):
+            return np.asarray((sums / np.bincount(known, minlength=count)[:, None])[own])
+
+
+class _Matched:
+    """Matches of one photograph with frames of a map, each frame matched once.
+
+    Args:
+        photograph: The photograph.
+        place: The map.
+        focal_px: Focal lengths (2,) of the map's frames.
+    """
+
+    def __init__(self, photograph: Photograph, place: StructureMap, focal_px: Array) -> None:
+        self.photograph = photograph
+        self._place = place
+        self._pixel = photograph.slope * focal_px
+        self._by_frame: dict[int, tuple[Rows, Rows]] = {}
+
+    def with_frames(self, frames: Iterable[int]) -> _Matches:
+        """List the matches with some frames of the map."""
+        pairs = [self._with_frame(int(frame)) for frame in frames]
+        own, feature = (np.concatenate(part) for part in zip(*pairs, strict=True))
+        return _Matches(own, self._pixel[own], self._place.point_m[feature])
+
+    def _with_frame(self, frame: int) -> tuple[Rows, Rows]:
+        """Match features of the photograph (m,) with features of the map (m,)."""
+        if frame not in self._by_frame:
+            features = self._place.features
+            own, other = mutual_matches(self.photograph.roots, features.roots(frame), RATIO)
+            self._by_frame[frame] = own, features.start[frame] + other
+        return self._by_frame[frame]
 
 
 def _are_apart(world_from_a: Array, world_from_b: Array) -> bool:

@@ -141,6 +141,33 @@ def supported_pose(
     return SupportedPose(pose, np.asarray(found["inlier_mask"], dtype=bool))
 
 
+def refined_pose(
+    pixel: Array,
+    point_m: Array,
+    world_from_cam: Array,
+    inlier: NDArray[np.bool_],
+    camera: pycolmap.Camera,
+) -> Array:
+    """Refine a pose on matches that agree with it.
+
+    Args:
+        pixel: Pixels (n, 2) that show the points, from the principal point.
+        point_m: Points (n, 3) in the world.
+        world_from_cam: Pose (4, 4) to start from.
+        inlier: Matches (n,) to refine it on.
+        camera: Camera without distortion, its principal point at 0.
+
+    Returns:
+        The pose (4, 4) that misses these matches least; the one given where none is found.
+    """
+    start = pycolmap.Rigid3d(inverse(world_from_cam)[:3])
+    found = pycolmap.refine_absolute_pose(start, pixel, point_m, inlier, camera)
+    if found is None:
+        return world_from_cam
+    cam_from_world = found["cam_from_world"].matrix()
+    return inverse(pose_matrix(cam_from_world[:, :3], cam_from_world[:, 3]))
+
+
 def refined_focal_px(
     pixel: Array, point_m: Array, world_from_cam: Array, camera: pycolmap.Camera
 ) -> float:
