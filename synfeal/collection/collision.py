@@ -129,8 +129,14 @@ def search(full: Triangles, questions: Questions, min_agreement: float) -> list[
         last = last_agreeing([trial.rung for trial in trials], min_agreement)
         if last + 1 == len(trials):
             break
-        between = np.sqrt(trials[last].rung.faces * trials[last + 1].rung.faces)
-        trials.insert(last + 1, next_trial(trials[last], round(between), reference))
+        measured = trials[last].rung.faces, trials[last + 1].rung.faces
+        between = round(np.sqrt(measured[0] * measured[1]))
+        if between in measured:
+            break
+        trial = next_trial(trials[last], between, reference)
+        if trial.rung.faces in measured:  # simplification has no step in between
+            break
+        trials.insert(last + 1, trial)
     chosen = last_agreeing([trial.rung for trial in trials], min_agreement)
     trials[chosen] = Trial(trials[chosen].mesh, replace(trials[chosen].rung, chosen=1))
     return trials

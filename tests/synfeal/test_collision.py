@@ -141,6 +141,21 @@ def test_the_choice_does_not_depend_on_the_clock_and_full_agreement_can_be_asked
     assert chosen.agreement == 1.0
 
 
+def test_no_face_count_is_measured_twice():
+    """Eight boxes in a room have 108 triangles; the ladder ends at 100, where a box is dented."""
+    boxes = [
+        trimesh.creation.box((0.8, 0.8, 1.2)).apply_translation([x, y, 1.2])
+        for x in (-2.2, -0.8, 0.8, 2.2)
+        for y in (-1.2, 1.2)
+    ]
+    full = triangles_of(trimesh.creation.box(bounds=ROOM), *boxes)
+    asked = draw_questions(RayCaster(*full), SCENE, BOX, np.random.default_rng(1), 1000)
+    found = [trial.rung.faces for trial in search(full, asked, 1.0)]
+    assert found[0] == 108
+    assert found[-1] == 100
+    assert found == sorted(set(found), reverse=True)
+
+
 def test_small_meshes_are_not_decimated_and_one_without_a_free_view_is_refused():
     box = trimesh.creation.box(bounds=ROOM)
     mesh = TexturedMesh((MeshPart("room", np.asarray(box.vertices), np.asarray(box.faces)),))
