@@ -25,7 +25,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from synfeal.camera.projection import cell_pixels, rays_of_pixels
+from synfeal.camera.projection import cell_centres_px, rays_of_pixels
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.layer_files import mask_pixels, normal_pixels, normals_of_pixels
 from synfeal.errors import exit_status
@@ -118,7 +118,7 @@ class Open3dRays:
         self, camera: CameraConfig, pose: Array, step_px: tuple[float, float]
     ) -> tuple[Array, Array]:
         """Return origins and rays (H, W, 3) of pixels, from where the camera begins to see."""
-        pixel = cell_pixels(camera, camera.width, camera.height) + step_px
+        pixel = cell_centres_px(camera, camera.width, camera.height) + step_px
         rays = rays_of_pixels(camera, pixel) @ pose[:3, :3].T
         return pose[:3, 3] + camera.near_m * rays, rays
 
@@ -213,7 +213,7 @@ def pair_values(
     times: dict[str, list[float]] = {}
     points = grid_points(camera, depths.__getitem__, poses, GRID, lambda: None)
     rows = np.arange(len(depths)).repeat(20)
-    pixel = cell_pixels(camera, camera.width, camera.height)
+    pixel = cell_centres_px(camera, camera.width, camera.height)
     agree, visible = [], []
     for index, depth_m in enumerate(depths):
         other = index + 1 - 2 * (index % 2)

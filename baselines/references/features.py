@@ -221,7 +221,7 @@ def write_views(
     """
     color, depth = files_of_split(sequences, split, n_frames)
     width, height = side
-    pixel = cell_pixels(camera, width, height)
+    pixel = output_centres_px(camera, width, height)
     column, row = np.moveaxis(pixel.astype(int), -1, 0)
     images = np.empty((len(color), height, width, 3), np.uint8)
     depth_m = np.full((len(color), *column.shape), np.inf, np.float32)
@@ -236,8 +236,11 @@ def write_views(
     Views(images, normalised_of_pixels(camera, pixel), depth_m).write(out_views)
 
 
-def cell_pixels(camera: CameraConfig, width: int, height: int) -> Array:
-    """Compute where the centres of a reduced image's cells lie in the camera's full image.
+def output_centres_px(camera: CameraConfig, width: int, height: int) -> Array:
+    """Compute the pixels of the full image that the network's outputs are of.
+
+    The network sees a reduced image and answers for every ``STRIDE``-th pixel of it along each
+    axis, from the first one on.
 
     Args:
         camera: Camera of the full image.
@@ -245,7 +248,8 @@ def cell_pixels(camera: CameraConfig, width: int, height: int) -> Array:
         height: Height of the reduced image, pixels.
 
     Returns:
-        Pixels (R, C, 2) of the full image, x before y; the first pixel's centre is at (0.5, 0.5).
+        Where the centres of those pixels (R, C, 2) lie in the full image: column and row, pixels,
+        of which the first one's centre is at (0.5, 0.5).
     """
     column, row = np.meshgrid(np.arange(0, width, STRIDE) + 0.5, np.arange(0, height, STRIDE) + 0.5)
     return np.stack([column * camera.width / width, row * camera.height / height], axis=-1)

@@ -24,7 +24,7 @@ from baselines.references.mapped import VIEW_PX, StructureMap, detect, detector
 from baselines.references.structure import pinhole, refined_focal_px, refined_pose, supported_pose
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.distortion import distort, undistort
-from synfeal.camera.projection import cell_pixels, normalised_of_pixels
+from synfeal.camera.projection import cell_centres_px, normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
 from synfeal.geometry.poses import inverse, pose_error
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
@@ -398,6 +398,6 @@ def _places(calibration: Calibration, camera: CameraConfig, columns: int, rows: 
 @lru_cache(16)
 def _places_of(calibration: Calibration, camera_json: str, columns: int, rows: int) -> Array:
     camera = CameraConfig.model_validate_json(camera_json)
-    ray = np.nan_to_num(normalised_of_pixels(camera, cell_pixels(camera, columns, rows)))
+    ray = np.nan_to_num(normalised_of_pixels(camera, cell_centres_px(camera, columns, rows)))
     centre = np.array([calibration.cx, calibration.cy])
     return centre + distort(ray, calibration.distortion) * [calibration.fx, calibration.fy]

@@ -211,8 +211,17 @@ def pixels_of_normalised(camera: Camera, normalised: Array) -> Array:
     return distort(normalised, camera.distortion) * [fx, fy] + [cx, cy]
 
 
-def cell_pixels(camera: Camera, columns: int, rows: int) -> Array:
-    """Return the centres (rows, columns, 2) of equal cells of an image: column and row, pixels."""
+def cell_centres_px(camera: Camera, columns: int, rows: int) -> Array:
+    """Divide an image into equal cells and return their centres.
+
+    Args:
+        camera: Camera of the image.
+        columns: Number of cells across; with the image's width, the cells are its pixels.
+        rows: Number of cells down.
+
+    Returns:
+        Centres (rows, columns, 2): x and y in the image, pixels.
+    """
     x = (np.arange(columns) + 0.5) * camera.width / columns
     y = (np.arange(rows) + 0.5) * camera.height / rows
     return np.stack(np.meshgrid(x, y), axis=-1)
@@ -230,7 +239,7 @@ def cell_directions(camera: AnyCamera, columns: int, rows: int) -> Array:
         Points (rows, columns, 3) in the frame of the camera, as :func:`rays_of_pixels` gives
         them: NaN where the lens shows nothing.
     """
-    return rays_of_pixels(camera, cell_pixels(camera, columns, rows))
+    return rays_of_pixels(camera, cell_centres_px(camera, columns, rows))
 
 
 def refuse_fold(camera: Camera) -> None:

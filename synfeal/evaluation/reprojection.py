@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synfeal.camera.projection import (
+    cell_centres_px,
     cell_directions,
-    cell_pixels,
     pixel_offset,
     pixels_of_points,
 )
@@ -117,7 +117,7 @@ def _moved(estimate_from_reference: Array, depth_m: Array, camera: CameraConfig)
     points = _directions(camera) * np.where(seen, depth_m, 1.0)[..., None]
     points = np.einsum("nij,nkj->nki", estimate_from_reference[:, :3, :3], points)
     points += estimate_from_reference[:, None, :3, 3]
-    cells = cell_pixels(camera, *CELLS).reshape(-1, 2)
+    cells = cell_centres_px(camera, *CELLS).reshape(-1, 2)
     offset = pixel_offset(camera, cells, pixels_of_points(camera, points))
     share = np.linalg.norm(offset, axis=-1) / np.hypot(camera.width, camera.height)
     share = np.fmin(share, 1.0)  # 1 where the camera cannot show the point
@@ -149,7 +149,7 @@ def read_cell_depth(path: Path, n_frames: int) -> Array:
 
 def depth_of_images(paths: Iterable[FrameFile], camera: CameraConfig) -> Iterator[Array]:
     """Yield depths (48,) at the centres of the cells from depth images of the camera's size."""
-    column, row = cell_pixels(camera, *CELLS).reshape(-1, 2).astype(int).T
+    column, row = cell_centres_px(camera, *CELLS).reshape(-1, 2).astype(int).T
     for path in paths:
         depth_m = read_depth_m(path, size=(camera.width, camera.height), remedy=OTHER_CAMERA)
         yield depth_m[row, column].astype(np.float64)

@@ -74,15 +74,23 @@ def table_of(block: bytes, n_columns: int, dtype: type) -> NDArray[Any]:
 
 
 def _blamed(block: bytes, n_columns: int, dtype: type) -> ValueError:
-    """Find the line of a block that is not what it should be."""
+    """Build the error that quotes the first line of a block that :func:`table_of` cannot read.
+
+    Args:
+        block: Lines, of which pandas refused one.
+        n_columns: Numbers that each should have.
+        dtype: ``np.float64`` or ``np.int64``. As floats, ``nan`` and ``inf`` are read, so whoever
+            has the table looks for them; as whole numbers they are blamed here.
+    """
     kind = float if dtype is np.float64 else int
     for line in block.split(b"\n")[:-1]:
-        words = line.split()
+        words = line.replace(b"\t", b" ").split(b" ")  # as pandas does; not at form feeds
+        words = [word for word in words if word]
         if len(words) != n_columns:
             return ValueError(f"'{shown(line)}' should have {n_columns} numbers")
         for word in words:
             try:
-                kind(word)
+                value = kind(word)
                 is_number = b"_" not in word  # which Python allows between digits
             except ValueError:
                 is_number = False
@@ -90,7 +98,9 @@ def _blamed(block: bytes, n_columns: int, dtype: type) -> ValueError:
                 hint = "; write decimals with a point" if b"," in word else ""
                 noun = "number" if kind is float else "whole number"
                 return ValueError(f"'{shown(word)}' in '{shown(line)}' is no {noun}{hint}")
-    return ValueError("its numbers are too large")
+            if kind is int and abs(value) > np.iinfo(dtype).max:
+                return ValueError(f"'{shown(word)}' in '{shown(line)}' is too large")
+    return ValueError("one of its lines does not hold numbers")
 
 
 def shown(text: bytes) -> str:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.projection import cell_pixels, pixel_offset
+from synfeal.camera.projection import cell_centres_px, pixel_offset
 from synfeal.config.dataset import CameraConfig
 from synfeal.errors import read_as
 from synfeal.pairing.correspondence import (
@@ -66,7 +66,7 @@ def flow_between(
         world_from_b: Pose (4, 4) of b.
         tolerance: Relative difference of depth up to which a point is visible.
     """
-    pixel = cell_pixels(camera, camera.width, camera.height)
+    pixel = cell_centres_px(camera, camera.width, camera.height)
     point_m = points_of_pixels(camera, pixel, depth_a_m, world_from_a)
     seen = look_for(point_m, camera, DepthImage(depth_b_m), world_from_b, tolerance)
     return Flow(pixel_offset(camera, pixel, seen.pixel).astype(np.float32), seen.state)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from synfeal.camera.projection import cell_pixels
+from synfeal.camera.projection import cell_centres_px
 from synfeal.config.dataset import CameraConfig
 from synfeal.pairing.correspondence import DepthImage, State, look_for, points_of_pixels
 
@@ -39,7 +39,7 @@ def grid_points(
         grid: Columns and rows of cells, P in all.
         on_frame: Called for each frame.
     """
-    pixel = cell_pixels(camera, *grid).reshape(-1, 2)
+    pixel = cell_centres_px(camera, *grid).reshape(-1, 2)
     # The pixel in the middle, or the one after it, so that depth need not be interpolated.
     column, row = np.minimum(pixel.astype(int), [camera.width - 1, camera.height - 1]).T
     centre = np.stack([column, row], axis=-1) + 0.5

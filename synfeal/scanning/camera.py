@@ -105,19 +105,20 @@ def pinhole(width: int, height: int, focal_px: float) -> CameraConfig:
     )
 
 
-def _preset(name: str) -> RgbdCamera:
+def _camera_of_sensor(name: str) -> RgbdCamera:
+    """Return the published calibration of a sensor of ``SENSORS``."""
     sensor = SENSORS[name]
     return RgbdCamera(
-        CameraConfig(**asdict(sensor.color)),
-        CameraConfig(**asdict(sensor.depth)),
-        np.eye(4),
-        sensor.depth_units_per_m,
-        f"preset {name}",
+        color=CameraConfig(**asdict(sensor.color)),
+        depth=CameraConfig(**asdict(sensor.depth)),
+        depth_from_color=np.eye(4),
+        depth_units_per_m=sensor.depth_units_per_m,
+        source=f"preset {name}",
     )
 
 
 PRESETS: Mapping[str, RgbdCamera] = {
-    name: _preset(name) for name in ("7scenes", "tum-fr1", "tum-fr2", "tum-fr3")
+    name: _camera_of_sensor(name) for name in ("7scenes", "tum-fr1", "tum-fr2", "tum-fr3")
 }
 
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from baselines.references.evidence import Evidence
-from baselines.references.features import Views, cell_pixels, write_views
+from baselines.references.features import Views, output_centres_px, write_views
 from baselines.references.scene_coordinates import (
     CoordinateNetwork,
     by_coordinates,
@@ -39,7 +39,7 @@ def wall_views(poses):
     point_m, _ = on_wall(poses, np.stack([column, row], axis=-1))
     color = np.clip(255 * (point_m[..., 1:] - [-2.5, -1.0]) / [5.0, 4.5], 0, 255)
     images = np.concatenate([color, np.full((*color.shape[:3], 1), 90.0)], axis=-1)
-    pixel = cell_pixels(SMALL, SMALL.width, SMALL.height)
+    pixel = output_centres_px(SMALL, SMALL.width, SMALL.height)
     slope = normalised_of_pixels(SMALL, pixel)
     return Views(images.astype(np.uint8), slope, on_wall(poses, pixel)[1].astype(np.float32))
 
@@ -65,7 +65,7 @@ def evidence_of(labels, samples_seen):
 
 
 def test_lifted_cells_are_the_points_of_the_wall():
-    views, pixel = wall_views(TRAIN), cell_pixels(SMALL, SMALL.width, SMALL.height)
+    views, pixel = wall_views(TRAIN), output_centres_px(SMALL, SMALL.width, SMALL.height)
     assert pixel.shape == (6, 8, 2)
     found = np.moveaxis(world_points(views, TRAIN), 1, -1)
     np.testing.assert_allclose(found, on_wall(TRAIN, pixel)[0], atol=1e-5)
@@ -89,7 +89,7 @@ def test_frames_are_reduced_and_cells_have_the_depth_behind_their_middle(tmp_pat
 
 def test_exact_coordinates_give_the_pose_and_useless_ones_none():
     evidence, views = evidence_of(TRAIN, 0), wall_views(TEST)
-    exact = on_wall(TEST, cell_pixels(SMALL, SMALL.width, SMALL.height))[0]
+    exact = on_wall(TEST, output_centres_px(SMALL, SMALL.width, SMALL.height))[0]
     exact[2] = 0.0  # one point for all cells
     found = poses_of(views, exact, evidence)
     assert np.isnan(found[2]).all()
@@ -116,7 +116,7 @@ def test_the_networks_size_stride_and_loss_are_those_of_its_source():
     found = network(torch.rand(2, 3, 66, 88))
     assert found.shape == (2, 3, 17, 22)
     assert (found == network.mean_m).all()  # untrained: the mean
-    assert cell_pixels(CAMERA, 88, 66).shape == (17, 22, 2)
+    assert output_centres_px(CAMERA, 88, 66).shape == (17, 22, 2)
     wanted = torch.zeros(1, 3, 1, 3)
     wanted[..., 2] = torch.inf
     found = torch.tensor([[3.0, 4.0, 0.0], [0.0, 0.0, 0.0], [9.0, 9.0, 9.0]]).T[None, :, None]

@@ -10,8 +10,8 @@ from synfeal.errors import InputError
 from synfeal.evaluation.metrics import BOUNDS, joint_error, summary, within
 from synfeal.evaluation.reprojection import (
     CELLS,
+    cell_centres_px,
     cell_depth_m,
-    cell_pixels,
     dcre,
     dcre_summary,
     read_cell_depth,
@@ -75,7 +75,7 @@ def by_opencv(predicted, reference, depth_m, camera):
     matrix = camera.intrinsics.matrix()
     lens = np.array(camera.distortion)
     errors = []
-    for pixel, z_m in zip(cell_pixels(camera, *CELLS).reshape(-1, 2), depth_m, strict=True):
+    for pixel, z_m in zip(cell_centres_px(camera, *CELLS).reshape(-1, 2), depth_m, strict=True):
         if not np.isfinite(z_m):
             continue
         criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-14)

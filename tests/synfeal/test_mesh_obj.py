@@ -336,6 +336,8 @@ def test_colours_behind_coordinates_are_fractions_or_levels(write, scale, weight
         ("v 0,5 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "write decimals with a point"),
         ("v 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "fewer than 3 numbers"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1.5 2.0 3.0\n", "is no whole number"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 NaN\n", "'NaN' in '1 2 NaN' is no whole number"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n", "'9{20}' in .* is too large"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "names vertex 4 of 3"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/2\n", "texture coordinate 2 of 1"),
         ("v 0 0 0\0\nf 1 1 1\n", "no text"),

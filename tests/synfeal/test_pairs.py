@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import synfeal
-from synfeal.camera.projection import cell_pixels
+from synfeal.camera.projection import cell_centres_px
 from synfeal.cli import main
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.frame_files import encode_png
@@ -74,7 +74,7 @@ class CastPair:
         self.pose_b[:3, 3] += forward @ STEP[:3, 3]
         rays_of = rays_through(camera)
         self.a, self.b = (Truth(mesh, camera, pose, rays_of) for pose in (self.pose_a, self.pose_b))
-        pixel = cell_pixels(camera, camera.width, camera.height)
+        pixel = cell_centres_px(camera, camera.width, camera.height)
         with np.errstate(invalid="ignore"):
             self.point = (self.a.depth_m[..., None] * rays_of(pixel)) @ self.pose_a[:3, :3].T
         self.point += self.pose_a[:3, 3]
@@ -366,7 +366,7 @@ def test_flow_of_wide_cameras_within_a_ball_in_closed_form(projection):
     wide = {"fx": 24.0, "fy": 25.0, "cx": 63.0, "cy": 33.0} if projection == "fisheye" else {}
     camera = CameraConfig(width=128, height=64, projection=projection, **wide)
     ray, pixel_of = (fisheye_ray, fisheye_pixel) if wide else (panorama_ray, panorama_pixel)
-    pixel = cell_pixels(camera, camera.width, camera.height)
+    pixel = cell_centres_px(camera, camera.width, camera.height)
     poses = [
         pose_matrix(rotation_from_rpy(rpy), np.array(position_m))
         for rpy, position_m in (
@@ -460,7 +460,7 @@ def test_a_wall_seen_from_half_as_far_in_closed_form(tmp_path):
     for both in ("overlap_ab", "overlap_ba"):  # apart by an eighth and a fifth of the picture
         assert 0.5 < other[both] < 0.9
     forth, back = read_flows(out / row["flow"])
-    from_middle = cell_pixels(FACING, FACING.width, FACING.height) - [32.0, 24.0]
+    from_middle = cell_centres_px(FACING, FACING.width, FACING.height) - [32.0, 24.0]
     np.testing.assert_allclose(forth.flow_px, from_middle, atol=1e-4)
     np.testing.assert_allclose(back.flow_px, -from_middle / 2, atol=1e-4)
     inner = (np.abs(from_middle) < [16, 12]).all(axis=-1)
