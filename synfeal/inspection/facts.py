@@ -51,6 +51,8 @@ def facts_of(found: Inspection) -> dict[str, Any]:
             "empty_pixels": asdict(suggestion.empty),
             "of_one_color": suggestion.one_color,
             "shade": suggestion.shade,
+            "min_view_distance_m": suggestion.scene.min_view_distance_m,
+            "min_path_m": suggestion.collection.min_path_m,
             "min_seen": suggestion.scene.min_seen,
             "min_clearance_m": suggestion.scene.min_clearance_m,
         }

@@ -209,8 +209,13 @@ def _indexed(
 ) -> ViewerMesh:
     """Join corners that agree in place and normal to one vertex, coloured by the surface nearby."""
     offset_m = bounds_m.mean(axis=0)
-    step_m = max(float(np.ptp(bounds_m, axis=0).max()) / 2.0 / STEPS, 1e-9)
-    steps = np.round((corners.reshape(-1, 3) - offset_m) / step_m)
+    from_middle_m = corners.reshape(-1, 3) - offset_m
+    reach_m = max(
+        float(np.ptp(bounds_m, axis=0).max()) / 2.0,
+        float(np.abs(from_middle_m).max(initial=0.0)),  # simplification moves corners outwards
+    )
+    step_m = max(reach_m / STEPS, 1e-9)
+    steps = np.round(from_middle_m / step_m)
     facing = np.round(np.repeat(normals, 3, axis=0) * 8.0)
     keys, index = np.unique(
         np.hstack([steps, facing]).astype(np.int16), axis=0, return_inverse=True

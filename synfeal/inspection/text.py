@@ -11,6 +11,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader
 
+from synfeal.config.collection import CollectionConfig, SceneConfig
 from synfeal.inspection.surface import viewer_js
 from synfeal.mesh.gltf import slug_of
 
@@ -101,9 +102,11 @@ def _suggested_lines(facts: Facts) -> list[str]:
     lines = [f"sampling_box: {first}"]
     if others:
         lines += ["further_boxes:", *(f"  - {box}" for box in others)]
-    for key in ("min_clearance_m", "min_seen"):
-        if collect[key]:
+    for key in ("min_view_distance_m", "min_clearance_m", "min_seen"):
+        if collect[key] not in (None, SceneConfig.model_fields[key].default):
             lines.append(f"{key}: {collect[key]:g}")
+    if collect["min_path_m"] != CollectionConfig.model_fields["min_path_m"].default:
+        lines.append(f"# and, beside scenes: collection: {{min_path_m: {collect['min_path_m']:g}}}")
     if collect["shade"]:
         lines.append(f"# and, beside scenes: render: {{shade: {collect['shade']}}}")
     return lines

@@ -12,8 +12,9 @@ import yaml
 from PIL import Image
 
 from synfeal.cli import main
-from synfeal.config.collection import SceneConfig
+from synfeal.config.collection import CollectionConfig, SceneConfig
 from synfeal.inspection.run import top_view
+from synfeal.inspection.text import snippet
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
 from tests.support.collected import painted
@@ -65,6 +66,18 @@ def test_files_and_numbers_are_those_of_the_room_and_what_is_printed_can_be_past
     assert scene.sampling_box is not None
     box = [scene.sampling_box.x, scene.sampling_box.y, scene.sampling_box.z]
     np.testing.assert_allclose(box, [[-2.7, 2.7], [-2.2, 2.2], [-0.7, 0.5]], atol=0.2)
+
+
+def test_a_scene_to_paste_asks_no_more_of_poses_than_the_command_does(inspected):
+    facts = json.loads((inspected[0] / "inspect.json").read_text())
+    assert "min_view_distance_m" not in snippet(facts)  # the default
+    facts["collect"] |= {"min_view_distance_m": 0.6, "min_path_m": 0.7}
+    text = snippet(facts)
+    (scene,) = yaml.safe_load("scenes:\n" + text)["scenes"].values()
+    assert SceneConfig.model_validate(scene).min_view_distance_m == 0.6
+    (beside,) = (line for line in text.splitlines() if "beside scenes: collection" in line)
+    collection = yaml.safe_load(beside.partition("scenes: ")[2])["collection"]
+    assert CollectionConfig.model_validate(collection).min_path_m == 0.7
 
 
 def test_the_top_view_shows_the_floor_in_its_place():

@@ -112,6 +112,16 @@ def test_the_copy_lies_where_the_mesh_does_in_its_colours_without_what_is_cut_ou
     assert area_m2(corners_m(small_copy(TexturedMesh((part,))))) == pytest.approx(8.0, rel=0.02)
 
 
+def test_corners_that_simplification_moves_out_of_the_mesh_stay_where_they_are(monkeypatch):
+    monkeypatch.setattr("synfeal.inspection.surface.SIMPLIFY_ABOVE", 16)
+    sphere = trimesh.creation.icosphere(3, radius=2.0)
+    part = MeshPart("ball", np.asarray(sphere.vertices), np.asarray(sphere.faces))
+    reach_m = np.abs(corners_m(small_copy(TexturedMesh((part,))))).max(axis=(0, 1))
+    assert reach_m.max() > 2.05  # farther out than whole numbers of 16 bits were made to reach
+    # As much volume as the ball needs a polyhedron of few sides to stick out, but not far.
+    assert reach_m.max() < 3.0
+
+
 def test_large_meshes_keep_their_shape():
     sphere = trimesh.creation.icosphere(6, radius=2.0)  # 81,920 faces
     rgb = np.where(sphere.vertices[:, 2:] > 0, [255, 0, 0], [0, 0, 255]).astype(np.uint8)
