@@ -58,11 +58,12 @@ def nearest_pose(evidence: Evidence) -> NDArray[np.float64]:
 
     An oracle: the best that copying a training pose can do.
     """
+    usable = evidence.train.usable_rows
     rows = nearest_rows(
-        train=read_pose_table(evidence.files["train_truth"]),
+        train=read_pose_table(evidence.files["train_truth"]).at(usable),
         test=read_pose_table(evidence.files["test_truth"]),
     )
-    return evidence.train.world_from_cam[rows]
+    return evidence.train.world_from_cam[usable[rows]]
 
 
 def nearest_rows(train: PoseTable, test: PoseTable) -> NDArray[np.int64]:

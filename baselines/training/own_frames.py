@@ -384,14 +384,15 @@ def _pack(
     def pixels(job: tuple[OwnFrames, FrameFile]) -> tuple[NDArray[np.uint8], Orientation]:
         own, file = job
         image, turn = read_image(file, "RGB"), Orientation.UPRIGHT
-        if own.camera is None and own.wide is None:
+        camera = own.camera or own.wide
+        if camera is None:
             photograph = image, turn = upright(image)
             image = _resampled(photograph, file, photographs, made.camera, resamplers)
-        elif own.camera is not None and image.size != (own.camera.width, own.camera.height):
+        elif image.size != (camera.width, camera.height):
             raise InputError(
                 file,
                 f"is of {image.width}x{image.height} pixels, {own.folder / MANIFEST} says"
-                f" {own.camera.width}x{own.camera.height}",
+                f" {camera.width}x{camera.height}",
                 "collect the data set again",
             )
         return fit_frame(image, network.input_px, network.view), turn

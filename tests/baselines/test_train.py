@@ -28,7 +28,7 @@ from synfeal.geometry.poses import pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.records.files import unfinished_prefix
 from synfeal.records.lock import only_command
-from tests.support.collected import refused
+from tests.support.collected import collect, refused
 
 ROOT = Path(__file__).parents[2]
 COUNT = 20
@@ -229,6 +229,16 @@ def test_a_data_set_is_learned_from_by_its_training_split(calm, tmp_path):
             np.testing.assert_array_equal(frames[index], fit_frame(opened, 64, "whole"))
     manifest = json.loads((calm / "manifest.json").read_text())
     assert packed.camera.fx == pytest.approx(manifest["camera"]["fx"])
+
+
+def test_frames_of_another_size_than_their_panorama_are_refused(mesh, tmp_path):
+    wide = ("--projection", "equirectangular", "--width", "64", "--height", "32", "--frames", "4")
+    assert collect(mesh, tmp_path / "set", *wide) == 0
+    (image, *_) = sorted((tmp_path / "set").rglob("*.color.png"))
+    with Image.open(image) as opened:
+        opened.crop((0, 0, 32, 32)).save(image)
+    with pytest.raises(InputError, match=r"is of 32x32 pixels, .* says 64x32"):
+        pack_own_frames([read_own_frames(tmp_path / "set", ())], UNKNOWN, NETWORK, tmp_path)
 
 
 def test_photographs_join_rendered_frames_in_their_world_and_camera(calm, photographs, tmp_path):

@@ -16,7 +16,7 @@ from baselines.labels.methods import truth_used
 from baselines.references.adjustment import placed_on
 from baselines.references.correspondences import Tracks
 from baselines.references.interpolated import by_interpolation
-from baselines.references.retrieval import nearest_label
+from baselines.references.retrieval import nearest_label, nearest_pose
 from baselines.references.structure import lifted, triangulate
 from baselines.training.data import read_labelled_frames
 from reproduction.config.load import load_config
@@ -106,6 +106,20 @@ def test_the_nearest_image_is_one_that_was_registered():
     np.testing.assert_array_equal(found[known], table.position_m[known])
     np.testing.assert_array_equal(found[2], table.position_m[1])
     np.testing.assert_array_equal(found[3], table.position_m[4])
+
+
+def test_the_nearest_pose_is_one_that_was_registered(tmp_path):
+    """Each test pose is a training pose; where that one is lost, its neighbour answers."""
+    table = labelled(12)
+    along = np.column_stack([np.arange(12.0), np.zeros((12, 2))])
+    level = np.tile([1.0, 0, 0, 0], (12, 1))
+    truth = replace(table, position_m=along, quat_wxyz=level, registered=None)
+    write_pose_table(tmp_path / "truth.csv", truth)
+    files = dict.fromkeys(("train_truth", "test_truth"), tmp_path / "truth.csv")
+    found = nearest_pose(SimpleNamespace(train=table, files=files))[:, :3, 3]
+    known = np.setdiff1d(np.arange(12), LOST)
+    np.testing.assert_array_equal(found[known], table.position_m[known])
+    np.testing.assert_array_equal(found[[2, 3]], table.position_m[[1, 4]])
 
 
 def test_labels_that_were_filled_in_have_no_part_in_interpolated_poses():
