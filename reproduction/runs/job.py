@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import logging
 import os
+import re
 import sys
 import traceback
 from collections.abc import Callable, Iterator
@@ -13,7 +14,7 @@ from pathlib import Path
 
 from pydantic import validate_call
 
-from synfeal.errors import InputError
+from synfeal.errors import Argument, InputError
 
 
 @contextmanager
@@ -32,10 +33,12 @@ def job(log: str | Path) -> Iterator[None]:
             os.dup2(file.fileno(), 1)
             os.dup2(file.fileno(), 2)
         sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
-        logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
+        handler = logging.StreamHandler()
+        handler.setFormatter(_Formatter("%(levelname)s %(name)s: %(message)s"))
+        logging.basicConfig(level=logging.INFO, handlers=[handler])
         yield
     except (InputError, MemoryError, OSError) as error:
-        line = f"error: {_sentence(error)}\n"
+        line = f"error: {in_keys(str(_sentence(error)))}\n"
         os.write(real_stderr, line.encode())
         with suppress(OSError):  # the log may lie on the disk that is full
             if not isinstance(error, InputError) or error.__cause__ is not None:
@@ -53,13 +56,16 @@ def uncollected() -> Iterator[None]:
     Importing torch makes a quarter of a million objects. Looking through them, again and again
     while there are more of them and once more at the end of the process, takes half as long as
     making them. So all objects alive when the block ends are left out of later searches for good.
+    A collector that was off before the block stays off.
     """
+    was_on = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
         gc.freeze()
-        gc.enable()
+        if was_on:
+            gc.enable()
 
 
 def run_job(log: str, function: Callable[..., object], /, **arguments: object) -> None:
@@ -76,9 +82,49 @@ def run_job(log: str, function: Callable[..., object], /, **arguments: object) -
         validate_call(function)(**arguments)
 
 
+def in_keys(text: str) -> str:
+    """Write the arguments that a text names as a configuration file has them.
+
+    Functions name their arguments as Python has them, ``box`` between backticks, for example. Who
+    runs the workflow gives no arguments, but the keys they come from: ``sampling_box``.
+
+    Args:
+        text: An error or a log line.
+    """
+    if "`" not in text:
+        return text
+    from synfeal.cli.wording import MARKED  # loads the models, which few jobs would need to do
+
+    def written(found: re.Match[str]) -> str:
+        argument, value = found.groups()
+        if value is None:
+            return f"`{_key_of(argument)}`"
+        in_yaml = {"True": "true", "False": "false"}.get(value, value)
+        return f"`{_key_of(argument)}: {in_yaml}`"
+
+    return MARKED.sub(written, text)
+
+
+def _key_of(argument: str) -> str:
+    """Return the key of a configuration file that an argument comes from."""
+    from synfeal.config.collect import KEYS
+
+    # Of several keys that are one argument, the first stands for all.
+    return {name: key for key, name in reversed(KEYS.items())}.get(argument, argument)
+
+
+class _Formatter(logging.Formatter):
+    """Formatter of log lines in the words of configuration files."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return in_keys(super().format(record))
+
+
 def _sentence(error: InputError | MemoryError | OSError) -> InputError:
     """Reword the error as a line for people, with what to do."""
     if isinstance(error, InputError):
+        if isinstance(error.where, Argument):
+            return InputError(_key_of(error.where.name), error.problem, error.remedy)
         return error
     if isinstance(error, MemoryError):
         return InputError(

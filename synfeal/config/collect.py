@@ -70,6 +70,7 @@ KEYS = {
     "calibration": "camera",
     "horizontal_fov_deg": "fov_deg",
     "stereo_baseline_m": "stereo_m",
+    "depth_units_per_m": "depth_scale",
     **dict.fromkeys(("fx", "fy", "cx", "cy", "distortion"), "camera"),
 }
 

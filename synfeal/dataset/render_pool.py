@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
+import queue
 import signal
 import sys
 import threading
@@ -12,6 +14,7 @@ from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from logging.handlers import QueueHandler
 from multiprocessing.connection import wait as wait_for_end
 from pathlib import Path
 from typing import Any
@@ -25,6 +28,7 @@ from synfeal.errors import InputError
 from synfeal.records.progress import Progress
 from synfeal.render.surface import Layers
 
+log = logging.getLogger("synfeal")
 POLL_S = 0.2
 Task = tuple[Path, PoseTable]  # `seq-01` or `seq-01.zip`, and its poses
 
@@ -93,7 +97,7 @@ def render_sequences(studio: Studio, tasks: list[Task], workers: int, progress: 
 def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: Progress) -> None:
     context = multiprocessing.get_context("spawn")  # a forked OpenGL context does not work
     n_done, stop = context.Value("q", 0), context.Event()
-    initial = (studio, workers, n_done, stop)
+    initial = (studio, workers, n_done, stop, log.getEffectiveLevel())
     executor = ProcessPoolExecutor(workers, context, _start_worker, initial)
     try:
         running = {executor.submit(_carry_out, task): task for task in tasks}
@@ -105,7 +109,10 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
             n_shown = n_seen
             for future in ended:
                 out, poses = running.pop(future)
-                progress.part_done(out.name, len(poses), future.result())
+                seconds, records = future.result()
+                for record in records:
+                    logging.getLogger(record.name).handle(record)
+                progress.part_done(out.name, len(poses), seconds)
     except BrokenProcessPool as error:
         raise InputError(
             "collect",
@@ -120,8 +127,16 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
 _worker: dict[str, Any] = {}  # what a worker process keeps between sequences
 
 
-def _start_worker(studio: Studio, workers: int, n_done: Any, stop: Any) -> None:
-    """Set up a worker process that ends with its parent and leaves Ctrl-C to it."""
+def _start_worker(studio: Studio, workers: int, n_done: Any, stop: Any, level: int) -> None:
+    """Set up a worker process that ends with its parent and leaves Ctrl-C to it.
+
+    Args:
+        studio: What renders.
+        workers: Number of processes.
+        n_done: Counter of frames that all of them share.
+        stop: Event that ends them.
+        level: Least level of log lines, which are kept for the parent: it knows how to word them.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     # Read by Mesa's software renderer when it starts.
@@ -134,7 +149,10 @@ def _start_worker(studio: Studio, workers: int, n_done: Any, stop: Any) -> None:
         if stop.is_set():  # another worker failed, or the person interrupted
             raise InputError("collect", "stopped")
 
-    _worker.update(studio=studio, on_frame=on_frame)
+    said: queue.SimpleQueue[logging.LogRecord] = queue.SimpleQueue()
+    logging.getLogger().addHandler(QueueHandler(said))
+    logging.getLogger().setLevel(level)
+    _worker.update(studio=studio, on_frame=on_frame, said=said)
 
 
 def _end_with_parent() -> None:
@@ -144,8 +162,10 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _carry_out(task: Task) -> float:
-    studio: Studio = _worker["studio"]
+def _carry_out(task: Task) -> tuple[float, list[logging.LogRecord]]:
+    """Render a sequence; return the seconds it took, and what was logged meanwhile."""
+    studio, said = _worker["studio"], _worker["said"]
     if "renderer" not in _worker:
         _worker["renderer"] = studio.open()
-    return studio.carry_out(_worker["renderer"], task, _worker["on_frame"])
+    seconds = studio.carry_out(_worker["renderer"], task, _worker["on_frame"])
+    return seconds, [said.get() for _ in range(said.qsize())]

@@ -110,7 +110,12 @@ def test_imports_are_not_looked_through_for_garbage_then_or_later():
         with pytest.raises(ImportError), uncollected():
             import absent_module  # noqa: F401
         assert gc.isenabled()
+        gc.disable()
+        with uncollected():
+            pass
+        assert not gc.isenabled()  # as it was before
     finally:
+        gc.enable()
         gc.unfreeze()
 
 

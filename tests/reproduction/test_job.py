@@ -45,3 +45,15 @@ def test_a_job_hands_its_function_what_that_annotates(tmp_path):
     run = subprocess.run([sys.executable, "-c", wrong], capture_output=True, text=True, check=False)
     assert run.returncode == 1
     assert "count" in log.read_text()
+
+
+def test_a_job_names_keys_of_the_configuration_where_functions_name_arguments(tmp_path):
+    error = "InputError('m.glb', 'is narrow', 'widen `box`, give `depth_scale=100` or `min_seen`')"
+    run = run_job(tmp_path, f"import logging; logging.warning('see `spacing_m`'); raise {error}")
+    line = "m.glb: is narrow; widen `sampling_box`, give `depth_units_per_m: 100` or `min_seen`"
+    assert run.stderr == f"error: {line}\n"
+    log = (tmp_path / "job.log").read_text()
+    assert "see `frame_spacing_m`\n" in log
+    assert line in log
+    about = "from synfeal.errors import Argument; raise InputError(Argument('box'), 'is empty')"
+    assert run_job(tmp_path, about).stderr == "error: sampling_box: is empty\n"

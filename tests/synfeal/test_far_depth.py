@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +127,22 @@ def test_depth_in_millimetres_counts_what_it_loses_and_names_the_remedy(hall, tm
     warnings = [record.getMessage() for record in caplog.records if "65.5 m" in record.message]
     assert warnings
     assert "`depth_scale=100`" in warnings[0]
+
+
+def test_what_processes_warn_of_is_worded_as_the_command_line_has_it(hall, tmp_path):
+    given = [
+        *("collect", hall, "--out", tmp_path / "set", "--frames", 4, "--sequence-frames", 2),
+        *("--width", 64, "--height", 48, "--depth", "--far", 300, "--cores", 2),
+    ]
+    words = [sys.executable, "-m", "synfeal.cli", *map(str, given)]
+    run = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    warnings = [line for line in run.stderr.splitlines() if "65.5 m" in line]
+    assert len(warnings) == 2  # one of each sequence
+    for line in warnings:
+        assert line.startswith("WARNING: seq-")
+        assert "(--depth-scale 100)" in line
+        assert "`" not in line
 
 
 def test_a_scale_without_depth_is_refused(hall, tmp_path, capfd):
