@@ -30,13 +30,14 @@ def _as_profile(typed: Sequence[str]) -> Sequence[str] | None:
     return ["profile", *(each for each in typed[1:] if each != "--print-config")]
 
 
+DEFAULT_PROFILE = "mini"
 COST_FLAGS = ("--profile", "--cores", "--measured", "--csv", "--compare")
 
 
 @command(
     "predict what a run of a profile costs",
     "synfeal cost --profile paper --cores 16",
-    option("--profile", "a profile of config/, or its .yaml file (mini)", default="mini"),
+    option("--profile", "a profile of config/, or its .yaml file (mini)"),
     option(
         "--cores",
         "processor cores, one job each (this machine's); with several numbers, a plan for each",
@@ -74,6 +75,7 @@ def cost(arguments: argparse.Namespace) -> None:
     from reproduction.plan.pace import PUBLISHED
     from reproduction.plan.plan import compare_text, plan_text
 
+    profile = arguments.profile or DEFAULT_PROFILE
     if arguments.gpu is not None:
         from reproduction.design.profiles import read_profile
         from reproduction.plan.gpu import gpu_text
@@ -81,16 +83,19 @@ def cost(arguments: argparse.Namespace) -> None:
         for option_name in ("csv", "compare", "cores", "measured"):
             if getattr(arguments, option_name):
                 raise InputError(f"--{option_name}: is of a plan on processors; leave out --gpu")
-        print(gpu_text(read_profile(arguments.profile), arguments.gpu), end="")
+        print(gpu_text(read_profile(profile), arguments.gpu), end="")
         return
     measured = arguments.measured or PUBLISHED
     if arguments.compare is not None:
+        for option_name in ("profile", "cores"):
+            if getattr(arguments, option_name) is not None:
+                raise InputError(f"--{option_name}: is of a plan; leave out --compare")
         text = compare_text(measured, arguments.compare, arguments.csv)
     else:
         cores = arguments.cores or [os.cpu_count() or 1]
         if min(cores) < 1:
             raise InputError(f"--cores: must be at least 1, found {min(cores)}")
-        text = plan_text(arguments.profile, measured, cores, arguments.csv)
+        text = plan_text(profile, measured, cores, arguments.csv)
     print(text, end="")
 
 

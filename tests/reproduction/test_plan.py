@@ -116,6 +116,12 @@ def test_a_run_at_half_the_speed_takes_twice_as_long(tmp_path, capsys):
     assert factors == pytest.approx([0.5, 2.0], rel=1e-3)
 
 
+@pytest.mark.parametrize("more", [("--cores", "2"), ("--profile", "mini")], ids=lambda m: m[0])
+def test_comparing_measured_runs_refuses_options_of_a_plan(more, capsys):
+    assert main(["cost", "--measured", str(MINI), "--compare", str(SMOKE), *more]) == 1
+    assert f"error: {more[0]}: is of a plan; leave out --compare" in capsys.readouterr().err
+
+
 def test_the_command_prints_and_writes_plans(tmp_path, capsys):
     out = tmp_path / "plan.csv"
     options = ["--profile", "mini", "--measured", str(MINI), "--cores", "1", "4"]
