@@ -20,13 +20,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from baselines.config.learning import ModelName
 from synfeal.errors import InputError, exit_status
 from synfeal.records.provenance import git_commit
 from synfeal.records.tables import write_frame
 
 ROOT = Path(__file__).resolve().parents[1]
-LOCALIZERS: tuple[ModelName, ...] = ("posenet", "hourglass", "posenet2resnet", "posenet2")
+PLAIN = " without auxiliary regressors"
+CASES = ("posenet", "hourglass", "posenet2resnet", "posenet2", "posenet2" + PLAIN)
 INPUT_PX, WIDTH, BATCH, FRAMES = 64, 0.25, 64, 128
 
 
@@ -51,15 +51,18 @@ class Trainee:
         )
         self.commit = git_commit(tree)
 
-    def step_ms(self, localizer: ModelName) -> float:
+    def step_ms(self, case: str) -> float:
         """Take the steps, and return the processor time of one, milliseconds.
+
+        Args:
+            case: One of ``CASES``.
 
         Raises:
             InputError: The process has ended.
         """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        print(localizer, file=self._process.stdin, flush=True)
+        print(case, file=self._process.stdin, flush=True)
         answer = self._process.stdout.readline()
         if not answer:
             raise InputError(self.commit, "this code could not train; what it said stands above")
@@ -72,7 +75,7 @@ class Trainee:
 
 
 def work(steps: int) -> None:
-    """Read names of localizers, and answer with the processor time of a step, milliseconds.
+    """Read cases, and answer with the processor time of a step of each, milliseconds.
 
     Imports what is on the path, and nothing that the other code may not have.
     """
@@ -99,8 +102,11 @@ def work(steps: int) -> None:
     )
     network = NetworkConfig(input_px=INPUT_PX, width=WIDTH, view="whole")
     for line in sys.stdin:
-        hyper = recipe_of(line.strip())
-        localizer = build_localizer(line.strip(), network, hyper)
+        name = line.strip().removesuffix(PLAIN)
+        hyper = recipe_of(name)
+        if line.strip().endswith(PLAIN) and "auxiliary" in type(hyper).model_fields:
+            hyper = hyper.model_copy(update={"auxiliary": False})
+        localizer = build_localizer(name, network, hyper)
         localizer.place_on(device)
         schedule = Schedule(
             samples_seen=steps * BATCH,
@@ -141,16 +147,16 @@ def run(options: argparse.Namespace) -> None:
     before, after = trainees = [Trainee(tree, options.steps) for tree in (options.before, ROOT)]
     rows = []
     try:
-        for localizer in LOCALIZERS:
+        for case in CASES:
             for trainee in trainees:
-                trainee.step_ms(localizer)  # not counted: the first one loads libraries
+                trainee.step_ms(case)  # not counted: the first one loads libraries
             times = np.array(
-                [[trainee.step_ms(localizer) for trainee in trainees] for _ in range(options.turns)]
+                [[trainee.step_ms(case) for trainee in trainees] for _ in range(options.turns)]
             )
             before_ms, after_ms = np.median(times, axis=0)
             low, ratio, high = np.quantile(times[:, 1] / times[:, 0], [0.25, 0.5, 0.75])
             row = {
-                "localizer": localizer,
+                "localizer": case,
                 "input_px": INPUT_PX,
                 "width": WIDTH,
                 "batch": BATCH,
@@ -165,7 +171,7 @@ def run(options: argparse.Namespace) -> None:
                 "after": after.commit,
             }
             rows.append(row)
-            print(f"{localizer:15} {before_ms:7.1f} {after_ms:7.1f} ms  x{ratio:.3f}", flush=True)
+            print(f"{case:40} {before_ms:7.1f} {after_ms:7.1f} ms  x{ratio:.3f}", flush=True)
             if options.out:
                 write_frame(options.out, pd.DataFrame(rows), "%.4g")
     finally:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +48,11 @@ SHORT = (
     (GIVEN, PHOTOGRAPHS, HEADLINE),
     (GIVEN, RENDERED, "retrieval"),
 )
+SHORTEST = (
+    (SFM, RENDERED, "structure"),
+    (SFM, RANDOMISED, HEADLINE),
+    (GIVEN, RENDERED, "structure"),
+)
 LABELS = {SFM: "SfM", GIVEN: "depth SLAM"}
 # Poses that others published (benchmarks/published_poses.py), by what that repository calls them.
 OTHERS = {"hloc": "hloc", "as": "Active Search"}
@@ -62,30 +67,14 @@ OTHERS_COLUMNS = {
 
 
 def real_headline(root: Path, others: Path) -> str:
-    """Tabulate the few rows of a published run that a visitor wants to see first.
+    """Tabulate the rows of a published run that a visitor wants to see first.
 
     Args:
         root: The published run.
         others: ``published_poses.csv``, scores of poses that others published of the same room.
     """
-    table = read_real(root / "tables" / f"{NAME}.csv")
-    main = table[table.direction == table.direction.iloc[0]]
+    main = _main_direction(root)
     published = read_frame(others, OTHERS_COLUMNS)
-    lines: list[dict[str, str]] = []
-    for labels, words in LABELS.items():
-        own = main[main.labels == labels]
-        if own.empty:
-            continue
-        for trained_on, method in (row[1:] for row in SHORT if row[0] == labels):
-            row = _best(own, trained_on) if method is None else _one(own, trained_on, method)
-            if row is not None:
-                lines.append({"labels": words, **_short_row(row, labels, trained_on, method)})
-        scored = published[published.labels == OTHERS_LABELS[labels]]
-        rows = rows_of(scored[scored.method.isin(list(OTHERS))])
-        lines.extend({"labels": words, **_others_row(row)} for row in rows)
-    shown = markdown_table(pd.DataFrame(lines))
-    direction = DIRECTIONS[str(main.direction.iloc[0])]
-    head = f"{direction}; {int(main.n_test.iloc[0]):,} photographs:"
     note = (
         f"\\* Poses that [Brachmann et al.]({OTHERS_URL})"
         " publish of other photographs of the same room, its"
@@ -95,7 +84,51 @@ def real_headline(root: Path, others: Path) -> str:
         " by centimetres, so that every method that matches images seems worse by them. Rendered"
         " cameras fill the box and headings of all photographs, those to be localized included."
     )
-    return "\n\n".join([head, shown, note, *_worth(main[main.labels == GIVEN])])
+    shown = _table_beside_others(main, published, SHORT)
+    worth = _worth(main[main.labels == GIVEN])
+    return "\n\n".join([_split_of(main), shown, note, *worth])
+
+
+def real_short(root: Path, others: Path) -> str:
+    """Tabulate the three rows of a published run that the read-me shows, beside others' poses.
+
+    Args:
+        root: The published run.
+        others: As for :func:`real_headline`.
+    """
+    main = _main_direction(root)
+    return _table_beside_others(main, read_frame(others, OTHERS_COLUMNS), SHORTEST)
+
+
+def _main_direction(root: Path) -> pd.DataFrame:
+    """Read the rows of a run's first way to part the photographs."""
+    table = read_real(root / "tables" / f"{NAME}.csv")
+    main: pd.DataFrame = table[table.direction == table.direction.iloc[0]]
+    return main
+
+
+def _split_of(main: pd.DataFrame) -> str:
+    direction = DIRECTIONS[str(main.direction.iloc[0])]
+    return f"{direction}; {int(main.n_test.iloc[0]):,} photographs:"
+
+
+def _table_beside_others(
+    main: pd.DataFrame, published: pd.DataFrame, shown: Sequence[tuple[str, str, str | None]]
+) -> str:
+    """Format chosen rows by labels, each followed by what others reach on these labels."""
+    lines: list[dict[str, str]] = []
+    for labels, words in LABELS.items():
+        own = main[main.labels == labels]
+        if own.empty:
+            continue
+        for trained_on, method in (row[1:] for row in shown if row[0] == labels):
+            row = _best(own, trained_on) if method is None else _one(own, trained_on, method)
+            if row is not None:
+                lines.append({"labels": words, **_short_row(row, labels, trained_on, method)})
+        scored = published[published.labels == OTHERS_LABELS[labels]]
+        rows = rows_of(scored[scored.method.isin(list(OTHERS))])
+        lines.extend({"labels": words, **_others_row(row)} for row in rows)
+    return markdown_table(pd.DataFrame(lines))
 
 
 def _short_row(row: Any, labels: str, trained_on: str, method: str | None) -> dict[str, str]:

@@ -7,7 +7,7 @@ against the true poses. A run that lacks the rows of a finding has one finding l
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -43,8 +43,7 @@ from synfeal.records.tables import Schema, read_frame, rows_of
 
 ROOM, SMALL, LARGE = "large_room", "6k", "80k"
 # Runs with fresh seeds that findings are told by, where they are published.
-LABELS, CONTROLS, DOSE, ERROR_SHAPES, MAPS = "labels", "controls", "dose", "shapes", "maps"
-BETTER_LABELS = "better_labels"
+LABELS, CONTROLS, DOSE, BETTER_LABELS = "labels", "controls", "dose", "better_labels"
 MEASURES = ("position_m", "orientation_deg")
 POSITION, ORIENTATION = "position_m_true", "orientation_deg_true"
 # What feature matching does without depth: points are where rays of two training frames meet.
@@ -69,6 +68,7 @@ class Finding(NamedTuple):
         evidence: Its numbers with their limits.
         against: What errors are measured against.
         table: Table below ``tables``, without suffix.
+        short: The sentence with one number, for those who read no more.
         run: Published run that the numbers are of; empty for the one that findings are asked of.
     """
 
@@ -76,6 +76,7 @@ class Finding(NamedTuple):
     evidence: str
     against: str
     table: str
+    short: str
     run: str = ""
 
 
@@ -170,7 +171,6 @@ def best(cells: pd.DataFrame) -> Any:
 
 def structure_beats_regression(root: Path) -> Finding | None:
     """Compare feature matching and regression on identical frames with exact labels."""
-    asked, root = root, fresh_run(root, MAPS)
     matched, network = reference(root, WITHOUT_DEPTH), best(localizers(root))
     if matched is None:
         return None
@@ -181,20 +181,20 @@ def structure_beats_regression(root: Path) -> Finding | None:
         return None
     return Finding(
         f"On identical frames, matching image features is {_times(factor.value)} times as exact as"
-        " regression.",
+        " regression by these small networks.",
         f"From {network.n_train:,} training frames with exact poses and no depth, matched features"
         f" locate test frames with a median error of {_cm(pair[0])} and {_deg(angles[0])}. The best"
         f" of the five networks, {TITLES[network.model]}, is off by {_cm(pair[1])} and"
         f" {_deg(angles[1])}.",
         "labels and truth alike, because these labels are exact",
         "references",
-        _told_by(root, asked),
+        f"From the same {network.n_train:,} frames, matched image features locate test frames to"
+        f" {_short_cm(pair[0])}, the best of five small networks to {_short_cm(pair[1])}.",
     )
 
 
 def a_map_beats_exact_labels(root: Path) -> Finding | None:
     """Compare a bundle-adjusted map from noisy labels with regression on exact ones."""
-    asked, root = root, fresh_run(root, MAPS)
     noise = most_noise(root)
     adjusted, network = reference(root, ADJUSTED, noise), best(localizers(root))
     if adjusted is None:
@@ -213,7 +213,9 @@ def a_map_beats_exact_labels(root: Path) -> Finding | None:
         f" {_cm(theirs[0])} and {_deg(theirs[1])}.",
         "the truth",
         "references",
-        _told_by(root, asked),
+        f"A map that is bundle-adjusted from labels {_noise(moved_by(root))} off locates to"
+        f" {_short_cm(ours[0])}; the best network, trained on exact labels, to"
+        f" {_short_cm(theirs[0])}.",
     )
 
 
@@ -270,7 +272,6 @@ def _shapes_by_frame(root: Path) -> dict[str, tuple[Interval, Interval]]:
 
 def shared_errors_stay(root: Path) -> Finding | None:
     """Compare label errors that are independent with those that frames share."""
-    asked, root = root, fresh_run(root, ERROR_SHAPES)
     changes = shape_changes(root)
     if len(changes) < len(SHAPES):
         return None
@@ -291,7 +292,9 @@ def shared_errors_stay(root: Path) -> Finding | None:
         f" the five networks, by {', '.join(parts[:-1])}, and {parts[-1]}.",
         "the truth",
         SHAPE_CHANGES if _has_by_frame(root) else SHAPES_ROWS,
-        _told_by(root, asked),
+        f"Labels {_noise(off_in_all_shapes(root))} off change the networks' orientation error by"
+        f" {_change(own.value)} if every frame has its own error, by {_change(space.value)} if"
+        " space is bent.",
     )
 
 
@@ -323,6 +326,9 @@ def noise_is_mostly_the_yardsticks(root: Path) -> Finding | None:
         f" {percent(harm[0])} and {percent(harm[1])}.",
         "labels or truth, as each sentence says",
         "table3_inconsistencies",
+        f"Noise changes the orientation error against noisy test labels by"
+        f" {_change(seen[1].value)}, against the true poses by {_change(harm[1].value)}: most of it"
+        " is in the yardstick.",
         _told_by(root, asked),
     )
 
@@ -390,6 +396,8 @@ def more_frames_help(root: Path) -> Finding | None:
         f" {SMALL} run was shown as many images as the {LARGE} runs.",
         "labels and truth alike",
         "table4_size",
+        f"From {SMALL} to {LARGE} frames the position error changes by {_change(position.value)},"
+        " part of it by longer training.",
     )
 
 
@@ -427,6 +435,8 @@ def frames_and_images(root: Path, controls: Path) -> Finding | None:
         f" {percent(images[0])} and {percent(images[1])}.",
         "labels and truth alike",
         "table4_size",
+        f"From {SMALL} to {LARGE} frames the position error changes by {_change(whole[0].value)},"
+        f" with no more images shown by {_change(frames[0].value)}.",
         controls.name,
     )
 
@@ -485,6 +495,7 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
     likely = ", so a small gain is likely" if lower > counted / 2 and chance < SURPRISING else ""
     posenet2 = (rows[rows.model == "posenet2"] for rows in (sfm, exact))
     errors_m = 100 * exact[POSITION]
+    largest = max(abs(100 * (one.value - 1)) for both in changes.values() for one in both)
     failing = where_labels_fail(fresh_run(asked, BETTER_LABELS))
     return Finding(
         "Exact labels in place of those of SfM and RGB-D SLAM: a difference can be seen only where"
@@ -500,6 +511,9 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
         f" and {percent(single[1])} {_printed(*posenet2)}.{failing}",
         "the truth",
         "table2_ground_truth",
+        f"Labels of SfM and RGB-D SLAM are {_ends(100 * own.position_m_median[[*names]])} cm off in"
+        f" the median, the networks {_ends(errors_m, 0)} cm: exact labels change the networks'"
+        f" mean errors by {largest:.0f} % at most.",
         _told_by(root, asked),
     )
 
@@ -626,6 +640,20 @@ def sentences(root: Path, link: str = "") -> list[str]:
     return items
 
 
+def short_sentences(root: Path, link: str) -> list[str]:
+    """List findings as Markdown, one sentence and the table each.
+
+    Args:
+        root: Published results.
+        link: Path from the page to ``root``.
+    """
+    items = []
+    for found in findings(root):
+        folder = f"{link.rpartition('/')[0]}/{found.run}" if found.run else link
+        items.append(f"{found.short} ([table]({folder}/tables/{found.table}.csv))")
+    return items
+
+
 def verdict_sentence(root: Path) -> str:
     """Say how the paper's claims fared against the truth, group by group."""
     rows = read_published(root)
@@ -653,6 +681,16 @@ def _printed(before: pd.DataFrame, after: pd.DataFrame) -> str:
 def _cm(interval: Interval) -> str:
     value, low, high = (two_digits(100 * end) for end in interval)
     return f"{value} cm ({low} – {high})"
+
+
+def _short_cm(interval: Interval) -> str:
+    return f"{two_digits(100 * interval.value)} cm"
+
+
+def _ends(values: Collection[float] | pd.Series, digits: int = 1) -> str:
+    """Format the lowest and the highest of some numbers."""
+    low, high = (f"{end:.{digits}f}".replace("-", "−") for end in (min(values), max(values)))
+    return f"{low} to {high}"
 
 
 def _deg(interval: Interval) -> str:

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
 import math
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from PIL import Image
 
 from reproduction.design.shapes import SHAPES
-from reproduction.figures.style import BLUE, GREEN, RC, VERMILION
+from reproduction.figures.style import BLUE, GREEN, VERMILION
 from reproduction.report.findings import (
     ADJUSTED,
-    ERROR_SHAPES,
-    MAPS,
     POSITION,
     WITHOUT_DEPTH,
     best,
-    fresh_run,
     localizers,
     most_noise,
     moved_by,
@@ -34,12 +27,10 @@ from reproduction.report.findings import (
     shared_errors_stay,
 )
 from reproduction.report.intervals import Interval, cell_interval
+from reproduction.report.stamped import digest, shows, stamped_png, write_stamped
 from reproduction.tables.layouts import TITLES
 from reproduction.tables.references import two_digits
-from synfeal.records.files import atomic_path
 
-DPI = 150
-SOURCE = "Source"  # key in the picture's metadata: what it was drawn from
 TRUTH = "against the truth"
 BOTH = "against truth = labels"
 TITLE_CHARACTERS = 84  # in a line
@@ -68,13 +59,12 @@ def panels(root: Path) -> list[Panel]:
 
     A panel that lacks a row, a value or a limit is left out.
     """
-    mapped, by_shape = fresh_run(root, MAPS), fresh_run(root, ERROR_SHAPES)
-    noise, off = most_noise(mapped), _said(moved_by(mapped))
-    clean, noisy = best(localizers(mapped)), best(localizers(mapped, noise))
+    noise, off = most_noise(root), _said(moved_by(root))
+    clean, noisy = best(localizers(root)), best(localizers(root, noise))
     found = {
-        "feature map, exact labels": (reference(mapped, WITHOUT_DEPTH), BOTH, BLUE),
+        "feature map, exact labels": (reference(root, WITHOUT_DEPTH), BOTH, BLUE),
         f"adjusted feature map, labels {off} off": (
-            reference(mapped, ADJUSTED, noise),
+            reference(root, ADJUSTED, noise),
             TRUTH,
             GREEN,
         ),
@@ -88,7 +78,7 @@ def panels(root: Path) -> list[Panel]:
     ]
     changes = [
         Row(SHAPES[shape], _change(orientation), TRUTH, VERMILION)
-        for shape, (_, orientation) in shape_changes(by_shape).items()
+        for shape, (_, orientation) in shape_changes(root).items()
     ]
     drawn = []
     if len(errors) == len(found) and _are_finite(errors):
@@ -105,7 +95,7 @@ def panels(root: Path) -> list[Panel]:
     if len(changes) == len(SHAPES) and _are_finite(changes):
         drawn.append(
             Panel(
-                _title_of_shapes(root, _said(off_in_all_shapes(by_shape))),
+                _title_of_shapes(root, _said(off_in_all_shapes(root))),
                 changes,
                 "change of the networks' orientation error, %, mean over five"
                 " (0: labels do no harm)",
@@ -136,38 +126,29 @@ def _are_finite(rows: Sequence[Row]) -> bool:
 
 def write_findings_figure(drawn: Sequence[Panel], out_png: Path) -> None:
     """Draw panels into a file that says what it was drawn from."""
-    with atomic_path(out_png) as temporary:
-        temporary.write_bytes(picture(drawn))
+    write_stamped(picture(drawn), out_png)
 
 
 def picture(drawn: Sequence[Panel]) -> bytes:
     """Draw the figure as PNG."""
-    buffer = io.BytesIO()
-    with matplotlib.rc_context(rc=RC):
-        metadata = {"Software": None, SOURCE: digest(drawn)}
-        findings_figure(drawn).savefig(
-            buffer, format="png", dpi=DPI, metadata=metadata, bbox_inches="tight", pad_inches=0.1
-        )
-    return buffer.getvalue()
+    return stamped_png(lambda: findings_figure(drawn), panels_digest(drawn))
 
 
 def is_drawn_from(png: Path, drawn: Sequence[Panel]) -> bool:
     """Tell whether an existing picture shows these panels."""
-    if not png.is_file():
-        return False
-    with Image.open(png) as image:
-        return image.info.get(SOURCE) == digest(drawn)
+    return shows(png, panels_digest(drawn))
 
 
-def digest(drawn: Sequence[Panel]) -> str:
-    """Hash what is drawn, numbers to six digits."""
-    texts = [
-        f"{panel.title}|{panel.axis}|{row.name}|{row.against}|"
-        + "|".join(f"{number:.6g}" for number in row.interval)
-        for panel in drawn
-        for row in panel.rows
-    ]
-    return hashlib.sha256("\n".join(texts).encode()).hexdigest()
+def panels_digest(drawn: Sequence[Panel]) -> str:
+    """Hash what is drawn."""
+    return digest(
+        [
+            f"{panel.title}|{panel.axis}|{row.name}|{row.against}|"
+            + "|".join(f"{number:.6g}" for number in row.interval)
+            for panel in drawn
+            for row in panel.rows
+        ]
+    )
 
 
 def findings_figure(drawn: Sequence[Panel]) -> Figure:

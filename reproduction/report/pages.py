@@ -21,21 +21,26 @@ import pandas as pd
 
 from baselines.config.learning import MODELS
 from reproduction.claims.table import claims_markdown
-from reproduction.real.findings import real_findings, real_headline, real_table
+from reproduction.real.findings import real_findings, real_headline, real_short, real_table
 from reproduction.report.findings import (
     MEASURES,
     can_tell,
     noise_changes,
     read_table,
     sentences,
+    short_sentences,
     verdict_sentence,
 )
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
 from reproduction.report.fresh import fresh_answer, fresh_claims
+from reproduction.report.paper_cells import paper_cells
+from reproduction.report.paper_figure import cells_digest, paper_picture
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
 from reproduction.report.realisations import PAPER_FRAMES, realisations_table
+from reproduction.report.reproduced import reproduced
 from reproduction.report.run_anew import run_anew, training_runs
+from reproduction.report.stamped import shows, write_stamped
 from reproduction.runs.results import read_result
 from reproduction.tables.assistance import SCHEMA as ASSISTANCE
 from reproduction.tables.assistance import TOTAL
@@ -59,6 +64,7 @@ REAL_PAGE, REAL = Path("docs/real.md"), "real"
 # Scores of what others published, which `make publish` does not make anew.
 OTHERS_POSES = Path("results/benchmarks/published_poses.csv")
 FIGURE = Path("docs/images/findings.png")
+PAPER_FIGURE = Path("docs/images/paper_against_ours.png")
 HEADLINES = ("night", "mini")
 LIMITS_NOTE = (
     "Brackets hold 95 % limits over test paths and training runs. The changes with label errors by"
@@ -84,7 +90,7 @@ def headline() -> str:
     return next((name for name in HEADLINES if (PUBLISHED / name).is_dir()), HEADLINES[-1])
 
 
-def findings(root: Path, top: str = "", claims_page: str = "docs/results.md") -> str:
+def findings(root: Path, top: str, claims_page: str) -> str:
     """Say what the run found, most important first, and how far its limits reach.
 
     Args:
@@ -97,6 +103,14 @@ def findings(root: Path, top: str = "", claims_page: str = "docs/results.md") ->
     found = sentences(root, f"{top}{root.as_posix()}")
     items = "\n".join(f"{n}. {text}" for n, text in enumerate(found, start=1))
     return f"{items}\n\n{LIMITS_NOTE.format(claims=f'{claims_page}#claims')}"
+
+
+def found(root: Path) -> str:
+    """List what the run found, a sentence each."""
+    if not can_tell(root):
+        return verdict_sentence(root)
+    texts = short_sentences(root, root.as_posix())
+    return "\n".join(f"{n}. {text}" for n, text in enumerate(texts, start=1))
 
 
 def origin(root: Path) -> str:
@@ -186,7 +200,8 @@ def difficulty(folder: Path = RESULTS / "benchmarks" / "scene_difficulty") -> st
 
 
 PARTS: dict[str, Callable[[Path], str]] = {
-    "findings": findings,
+    "found": found,
+    "reproduced": reproduced,
     "answer": partial(findings, top="../", claims_page=""),
     "origin": origin,
     "size": size_table,
@@ -202,6 +217,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "difficulty": lambda root: difficulty(),
     "real": real_findings,
     "real_headline": lambda root: real_headline(root, OTHERS_POSES),
+    "real_short": lambda root: real_short(root, OTHERS_POSES),
     "photographs": real_table,
 }
 
@@ -291,6 +307,10 @@ def stale(check: bool) -> list[Path]:
     drawn = panels(shown) if can_tell(shown) else []
     if drawn and not is_drawn_from(FIGURE, drawn):
         writers[FIGURE] = partial(write_findings_figure, drawn, FIGURE)
+    cells = paper_cells(shown)
+    if len(cells) and not shows(PAPER_FIGURE, cells_digest(cells)):
+        content = paper_picture(cells)
+        writers[PAPER_FIGURE] = partial(write_stamped, content, PAPER_FIGURE)
     for write in () if check else writers.values():
         write()
     return list(writers)

@@ -121,6 +121,7 @@ def test_structure_against_regression(told):
     root = told_by(finding)
     matched, network = reference_row(root, "structure-rays"), best_network(root)
     (factor,) = numbers(finding.headline)
+    near(numbers(finding.short)[1:], [100 * row[POSITION] for row in (matched, network)])
     assert factor == pytest.approx(network[POSITION] / matched[POSITION], rel=0.05)
     frames, *printed = numbers(finding.evidence)
     assert frames == network.n_train
@@ -144,12 +145,13 @@ def test_a_map_from_noisy_labels(told):
     expected += [adjusted[f"{ORIENTATION}{end}"] for end in ("", "_low", "_high")]
     expected += [100 * end for end in with_limits(network, POSITION)]
     near(printed, expected + with_limits(network, ORIENTATION))
+    near(numbers(finding.short), [30, 20, expected[0], expected[6]])
     assert adjusted[f"{POSITION}_high"] < with_limits(network, POSITION)[1]
 
 
-def test_shapes_of_label_errors(told):
-    finding = told["shared_errors_stay"]
-    root = told_by(finding)
+def test_shapes_of_label_errors():
+    root = NIGHT.with_name("shapes")
+    finding = shared_errors_stay(root)
     cells = table("table6_label_errors", root)
     clean = cells[cells.labels == "synfeal"]
     worst = cells[cells.noise_m == 0.3]
@@ -171,6 +173,7 @@ def test_shapes_of_label_errors(told):
     assert of_space[1] > of_frames[2]
     shared_stay = of_paths[1] > of_frames[2]
     assert ("frames share do not" in finding.headline) == shared_stay
+    assert numbers(finding.short)[2:] == [of_frames[0], of_space[0]]
 
 
 def test_shapes_of_a_run_that_was_not_compared_frame_by_frame(tmp_path):
@@ -223,6 +226,7 @@ def test_noise_and_the_yardstick(told):
         ends = numbers(claims["C5"][f"interval_{score}"].split("both: ")[1])
         found = [told_numbers[start + place] for place in (1, 2, 4, 5)]
         assert found == pytest.approx(ends, abs=0.51)
+    assert numbers(finding.short) == [told_numbers[3], told_numbers[13]]
     # Most of it is the yardstick: more than half of either change.
     assert alone[0] > seen[0] / 2
     assert alone[1] > seen[1] / 2
@@ -296,6 +300,7 @@ def test_frames_and_images_of_the_run_that_keeps_them_apart(told):
             value, low, high = found[at : at + 3]
             assert value == round(change(old, new, measure))
             assert low < value < high
+    assert numbers(finding.short) == [found[2], found[11]]
     surely_fewer_errors = found[13] < 0 and found[16] < 0
     assert ("no more images" in finding.headline) == surely_fewer_errors
 

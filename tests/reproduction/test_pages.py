@@ -123,7 +123,7 @@ def test_unknown_parts_and_unpublished_results_are_input_errors(root):
 
 
 def test_a_run_without_the_tables_of_the_findings_tells_its_verdicts_alone(root):
-    told = part_of("findings", "mini")
+    told = part_of("found", "mini")
     assert "Of the paper's 16 claims" in told
     assert "1." not in told.split("Of the paper")[0]
 

@@ -32,6 +32,8 @@ from reproduction.report.html.tables import (
     table_title,
     verdict_table,
 )
+from reproduction.report.paper_cells import paper_cells
+from reproduction.report.paper_figure import paper_picture
 from reproduction.report.summary import run_sentences
 from reproduction.tables import meshes, real
 from reproduction.tables.cells import key_of, published_cells, read_cells
@@ -153,13 +155,23 @@ def write_report(
     write_text(out_html, page)
 
 
-def opening(root: Path) -> str:
-    """Draw the main findings as a ``data:`` address; empty where the run lacks their rows."""
+def opening(root: Path) -> list[dict[str, str]]:
+    """Draw what a report opens with, as ``data:`` addresses: the paper beside ours, the findings.
+
+    A picture whose rows the run lacks is left out.
+    """
+    cells = paper_cells(root)
+    pictures = {}
+    if len(cells):
+        pictures["Every cell of Tables 2 to 5, printed against ours"] = paper_picture(cells)
     drawn = panels(root) if can_tell(root) else []
-    if not drawn:
-        return ""
-    content = base64.b64encode(picture(drawn)).decode("ascii")
-    return f"data:image/png;base64,{content}"
+    if drawn:
+        title = "Feature matching against regression, and errors of labels by their shape"
+        pictures[title] = picture(drawn)
+    return [
+        {"title": title, "address": f"data:image/png;base64,{base64.b64encode(png).decode()}"}
+        for title, png in pictures.items()
+    ]
 
 
 def _tables(
