@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from synfeal.config.collection import SceneConfig
 from synfeal.inspection.freespace import FreeSpace, survey, viewpoint
+from synfeal.inspection.pieces import without_small_pieces
 from synfeal.inspection.suggest import MAX_OF_ONE_COLOR, MAX_PLAIN, Suggestion, suggest
 from synfeal.inspection.surface import SurfacePoints, area_by_color, triangle_areas_m2
 from synfeal.mesh.checks import shows_one_color
@@ -168,6 +169,22 @@ def suggestion_doubts(suggestion: Suggestion) -> list[str]:
     )
 
 
+def pieces_doubts(left_out: float) -> list[str]:
+    """Return the doubt about small pieces.
+
+    Args:
+        left_out: Share of the faces of a mesh that are in pieces left out of the search.
+    """
+    return _that_hold(
+        (
+            left_out > 0.0,
+            f"a place for cameras was found only without the small pieces that lie apart from the"
+            f" rest, {left_out:.0%} of the faces: frames will show them; if they are dust or what a"
+            " scanner saw through windows, remove them (in MeshLab: Remove Isolated Pieces)",
+        ),
+    )
+
+
 def floor_areas_m2(normal: Array, position_m: Array, area_m2: float) -> Array:
     """Estimate the area of the largest floor if x, y or z pointed up.
 
@@ -212,15 +229,19 @@ def load_as_meant(
         The scene as it was taken, the mesh, and a sentence for each thing that was assumed.
     """
     mesh, notes = _load(scene), []
-    extents_m = np.ptp(mesh.bounds_m, axis=0)
-    is_odd = not EXTENTS_M[0] <= extents_m.max() <= EXTENTS_M[1]
+    main = mesh
+    if not _is_of_a_size(mesh):
+        rest = without_small_pieces(mesh)
+        main = rest if _is_of_a_size(rest) else mesh
+    extents_m = np.ptp(main.bounds_m, axis=0)
+    is_odd = not _is_of_a_size(main)
     units = units_of_a_room(extents_m / scene.unit_m)
     if is_odd and units and not unit_is_given:
         # What makes the smallest extent most like the height of a room.
         height = max(extents_m.min(), 1e-9) / STOREY_M
         unit_m = min(units, key=lambda unit: abs(np.log(unit * height)))
         scene = scene.model_copy(update={"unit_m": unit_m})
-        mesh = _load(scene)
+        main = mesh = _load(scene)
         before, after = (" x ".join(f"{m:.3g}" for m in k * extents_m) for k in (1.0, unit_m))
         notes.append(
             f"the mesh spans {before}, which no room does in metres; taken as"
@@ -228,8 +249,8 @@ def load_as_meant(
             f" {after} m; if that is wrong, give `unit_m`"
         )
     if scene.up_axis == "auto":
-        points = SurfacePoints.of(mesh, np.random.default_rng(0), N_POINTS)
-        area_m2 = sum(float(triangle_areas_m2(part).sum()) for part in mesh.parts)
+        points = SurfacePoints.of(main, np.random.default_rng(0), N_POINTS)
+        area_m2 = sum(float(triangle_areas_m2(part).sum()) for part in main.parts)
         floors_m2 = floor_areas_m2(points.normal, points.position_m, area_m2)
         if floors_m2.argmax() == 1 and floors_m2[1] >= FLOOR_RATIO * floors_m2[2]:
             other = "z" if is_y_up(cast(Path, scene.path), "auto") else "y"
@@ -240,6 +261,12 @@ def load_as_meant(
                 f" {floors_m2[2]:.3g} m^2; if that is wrong, give `up_axis`"
             )
     return scene, mesh, notes
+
+
+def _is_of_a_size(mesh: TexturedMesh) -> bool:
+    """Tell whether a mesh is neither too long nor too short for a room or what rooms are in."""
+    longest_m = float(np.ptp(mesh.bounds_m, axis=0).max())
+    return EXTENTS_M[0] <= longest_m <= EXTENTS_M[1]
 
 
 def _load(scene: SceneConfig) -> TexturedMesh:
@@ -254,6 +281,7 @@ class Inspection:
     scene: SceneConfig  # path, axis and unit as they were taken
     mesh: TexturedMesh
     assumed: tuple[str, ...]  # sentences about what the file did not say
+    searched: TexturedMesh  # the mesh, or what of it is in no small piece
     surface: SurfacePoints  # points spread over the mesh
     caster: RayCaster  # rays against it
     box_m: Array  # (2, 3) the box that was searched
@@ -262,16 +290,59 @@ class Inspection:
 
     @classmethod
     def of(cls, scene: SceneConfig, unit_is_given: bool) -> Self:
-        """Load and look at a mesh; see :func:`synfeal.inspection.run.inspect_mesh`."""
+        """Load and look at a mesh; see :func:`synfeal.inspection.run.inspect_mesh`.
+
+        Where no place is found, it is looked for among what of the mesh is in no small piece:
+        dust fills the air, and what lies far outside makes the grid of places wide.
+        """
         scene, mesh, assumed = load_as_meant(scene, unit_is_given)
         box_m = sampling_box_of(scene, mesh.bounds_m, str(scene.path))
+        whole = cls._in(scene, mesh, tuple(assumed), mesh, box_m)
+        if whole.suggestion is not None:
+            return whole
+        rest = without_small_pieces(mesh)
+        if rest is mesh:
+            return whole
+        if scene.sampling_box is None:
+            box_m = rest.bounds_m
+        cleaned = cls._in(scene, mesh, tuple(assumed), rest, box_m)
+        return whole if cleaned.suggestion is None else cleaned
+
+    @classmethod
+    def _in(
+        cls,
+        scene: SceneConfig,
+        mesh: TexturedMesh,
+        assumed: tuple[str, ...],
+        searched: TexturedMesh,
+        box_m: Array,
+    ) -> Self:
+        """Look for places in a box (2, 3), among what is searched of a mesh."""
         surface = SurfacePoints.of(mesh, generator_of(0, "inspect"))
         caster = RayCaster(*mesh.merged())
-        found = survey(caster, surface.position_m, box_m)
-        area_m2 = area_by_color(mesh)
-        plain = 1.0 if shows_one_color(mesh) else plain_share(area_m2)
-        space, suggestion = suggest(mesh, caster, found, scene, plain)
-        return cls(scene, mesh, tuple(assumed), surface, caster, box_m, space, suggestion)
+        near, in_the_way = surface, caster
+        if searched is not mesh:
+            near = SurfacePoints.of(searched, generator_of(0, "inspect"))
+            in_the_way = RayCaster(*searched.merged())
+        found = survey(in_the_way, near.position_m, box_m)
+        plain = 1.0 if shows_one_color(mesh) else plain_share(area_by_color(mesh))
+        space, suggestion = suggest(mesh, caster, in_the_way, found, scene, plain)
+        return cls(
+            scene=scene,
+            mesh=mesh,
+            assumed=assumed,
+            searched=searched,
+            surface=surface,
+            caster=caster,
+            box_m=box_m,
+            space=space,
+            suggestion=suggestion,
+        )
+
+    @property
+    def left_out(self) -> float:
+        """Share of the faces that are in small pieces and were left out of the search."""
+        return 1.0 - self.searched.n_faces / self.mesh.n_faces
 
     @property
     def suggested_m(self) -> Array:
@@ -283,4 +354,4 @@ class Inspection:
         """Place (3,) the pictures are taken from: in the free space if there is any."""
         boxes_m = self.suggested_m
         found_m = viewpoint(self.space, boxes_m[0] if len(boxes_m) else None)
-        return self.mesh.bounds_m.mean(axis=0) if found_m is None else found_m
+        return self.searched.bounds_m.mean(axis=0) if found_m is None else found_m

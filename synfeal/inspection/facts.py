@@ -17,6 +17,7 @@ from synfeal.inspection.doubts import (
     color_doubts,
     doubts_of,
     floor_areas_m2,
+    pieces_doubts,
     suggestion_doubts,
 )
 from synfeal.inspection.freespace import DEFINITION, FreeSpace
@@ -41,6 +42,7 @@ def facts_of(found: Inspection) -> dict[str, Any]:
     detail, collect = detail_of(mesh), None
     area_m2, surface = detail["area_m2"], found.surface
     floors_m2 = floor_areas_m2(surface.normal, surface.position_m, sum(area_m2.values()))
+    extents_m = np.ptp(found.searched.bounds_m, axis=0)
     topology = mesh_topology(*merge_vertices(*mesh.merged()))
     lengths = topology.pop("hole_lengths_m")
     if suggestion is not None:  # the command, and what planning it once showed
@@ -84,7 +86,8 @@ def facts_of(found: Inspection) -> dict[str, Any]:
         "doubts": [
             *found.assumed,
             *color_doubts(mesh, area_m2),
-            *doubts_of(np.ptp(mesh.bounds_m, axis=0), floors_m2, space, found.scene.unit_m),
+            *pieces_doubts(found.left_out),
+            *doubts_of(extents_m, floors_m2, space, found.scene.unit_m),
             *([] if suggestion is None else suggestion_doubts(suggestion)),
         ],
         "version": synfeal.__version__,

@@ -124,7 +124,7 @@ def picture_png(facts: Facts, found: Inspection) -> bytes:
 
     It is cut at mid-height of the suggested box, if there is one.
     """
-    (_, _, low), (_, _, high) = found.mesh.bounds_m.tolist()
+    (_, _, low), (_, _, high) = found.searched.bounds_m.tolist()
     boxes_m, position_m = found.suggested_m, found.viewpoint_m
     cut_m = float(boxes_m[0, :, 2].mean()) if len(boxes_m) else low + 0.6 * (high - low)
     values = facts["properties"]
@@ -139,7 +139,7 @@ def picture_png(facts: Facts, found: Inspection) -> bytes:
     text(0.02, 0.92, caption, fontsize=11, color="0.35")
     shade = None if found.suggestion is None else found.suggestion.shade
     views = inside_views(found.mesh, position_m, shade)
-    _draw_top(figure, top_view(found.mesh, cut_m), cut_m, boxes_m, position_m)
+    _draw_top(figure, top_view(found.searched, cut_m), cut_m, boxes_m, position_m)
     for index, (yaw, view) in enumerate(zip(LOOKS_ALONG, views, strict=True)):
         left, bottom = 0.45 + 0.272 * (index % 2), 0.50 - 0.43 * (index // 2)
         axes = figure.add_axes((left, bottom, 0.265, 0.36))

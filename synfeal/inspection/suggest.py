@@ -132,13 +132,19 @@ class Suggestion:
 
 
 def suggest(
-    mesh: TexturedMesh, caster: RayCaster, found: Survey, scene: SceneConfig, plain: float
+    mesh: TexturedMesh,
+    caster: RayCaster,
+    searched: RayCaster,
+    found: Survey,
+    scene: SceneConfig,
+    plain: float,
 ) -> tuple[FreeSpace, Suggestion | None]:
     """Find the free space of a mesh and a collection in it whose images show something.
 
     Args:
         mesh: World frame.
         caster: Rays against it.
+        searched: Rays against what of it counts as in the way between places.
         found: What rays tell of points in it.
         scene: Its settings; boxes, and what is asked of poses, are replaced.
         plain: Share of its surface that has one plain colour, or no colour.
@@ -147,7 +153,7 @@ def suggest(
         The free space, and a collection in it; None if no path was found. What is only just inside
         is considered where nothing better is.
     """
-    places = [_Places.of(find_free_spaces(caster, found, slack)) for slack in SLACKS]
+    places = [_Places.of(find_free_spaces(searched, found, slack)) for slack in SLACKS]
     for some in (places[:-1], places[-1:]):
         best = _best_covering(_attempts(mesh, caster, scene, some))
         if best is not None:

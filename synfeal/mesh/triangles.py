@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from synfeal.errors import InputError, read_as
 from synfeal.mesh.model import MeshPart, TexturedMesh
@@ -61,6 +63,14 @@ def weld(points_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
     index = np.empty(len(keys), np.int64)
     index[order] = np.cumsum(is_new) - 1
     return points_m[order[is_new]], index
+
+
+def pieces_of(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
+    """Label each triangle (F, 3) with the number (F,) of the connected piece it belongs to."""
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    graph = coo_array((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), (n_vertices,) * 2)
+    label = connected_components(graph, directed=False)[1]
+    return np.asarray(label[faces[:, 0]], np.int64)
 
 
 def save_collision_mesh(path: Path, mesh: Triangles) -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from synfeal.mesh.triangles import pieces_of
 from synfeal.scanning.fusion import FusedSurface
 
 
@@ -32,11 +30,3 @@ def without_small_pieces(surface: FusedSurface, min_area_m2: float) -> tuple[Fus
         faces=faces.reshape(-1, 3).astype(np.int64),
     )
     return rest, int(np.sum(~kept & (area_m2 > 0)))
-
-
-def pieces_of(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
-    """Label each triangle (F, 3) with the number (F,) of the connected piece it belongs to."""
-    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    graph = coo_array((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), (n_vertices,) * 2)
-    label = connected_components(graph, directed=False)[1]
-    return np.asarray(label[faces[:, 0]], np.int64)

@@ -18,7 +18,13 @@ from synfeal.inspection.boxes import (
     suggest_box,
     suggest_boxes,
 )
-from synfeal.inspection.doubts import color_doubts, doubts_of, floor_areas_m2, load_as_meant
+from synfeal.inspection.doubts import (
+    Inspection,
+    color_doubts,
+    doubts_of,
+    floor_areas_m2,
+    load_as_meant,
+)
 from synfeal.inspection.facts import detail_of, texels_per_m
 from synfeal.inspection.freespace import (
     FreeSpace,
@@ -27,6 +33,7 @@ from synfeal.inspection.freespace import (
     survey,
     viewpoint,
 )
+from synfeal.inspection.pieces import without_small_pieces
 from synfeal.inspection.surface import SurfacePoints, nearest_texels
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.rays import RayCaster
@@ -274,6 +281,46 @@ def test_a_unit_is_assumed_only_where_it_makes_a_room(tmp_path, side, taken):
     found = doubts(np.ptp(mesh.bounds_m, axis=0), unit_m=scene.unit_m)
     assert "unit_m" not in found
     assert bool(found) == (side == 6e7)
+
+
+def flecks(low, high, count=900):
+    """Triangles of some centimetres, which a laser scanner makes of dust, glass and mirrors."""
+    rng = np.random.default_rng(2)
+    corners = rng.uniform(low, high, (count, 1, 3)) + rng.normal(0.0, 0.04, (count, 3, 3))
+    return trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
+
+
+@pytest.mark.parametrize(
+    "stray",
+    [
+        pytest.param(flecks((-2.9, -1.9, 0.1), (2.9, 1.9, 2.9)), id="in the air"),
+        pytest.param(flecks((3.0, -150.0, 0.0), (150.0, 150.0, 60.0)), id="far outside"),
+    ],
+)
+def test_a_room_is_found_among_what_a_scanner_made_of_dust_and_windows(tmp_path, stray):
+    """Neither does dust count as in the way, nor does what lies far outside change the unit."""
+    open_room = room()
+    open_room.update_faces(open_room.face_normals[:, 2] < 0.5)
+    trimesh.util.concatenate([open_room, stray]).export(tmp_path / "scan.ply")
+    found = Inspection.of(PlaceConfig(mesh=tmp_path / "scan.ply", up_axis="z").scene, False)
+    assert found.scene.unit_m == 1.0
+    assert found.left_out == len(stray.faces) / (len(stray.faces) + len(open_room.faces))
+    assert len(found.suggested_m)
+    low, size = np.array([-3.0, -2.0, 0.0]), np.array(ROOM_M)
+    inside = (found.suggested_m >= low) & (found.suggested_m <= low + size)
+    assert inside.all()
+    assert np.ptp(found.suggested_m[0, :, :2], axis=0) == pytest.approx(size[:2] - 0.6, abs=0.4)
+
+
+def test_pieces_are_small_against_the_largest_only():
+    small = flecks((-2.0, -1.0, 0.0), (2.0, 1.0, 2.0), count=40)
+    alone = TexturedMesh((MeshPart("dust", small.vertices, small.faces),))
+    assert without_small_pieces(alone) is alone
+    box = room()
+    both = TexturedMesh(
+        (MeshPart("room", np.array(box.vertices), np.array(box.faces)), *alone.parts)
+    )
+    assert [part.name for part in without_small_pieces(both).parts] == ["room"]
 
 
 def test_terrain_is_no_room_in_inches(tmp_path):
