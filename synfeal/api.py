@@ -315,6 +315,9 @@ def inspect(
     Returns:
         The numbers, as in ``inspect.json``; ``collect`` holds a suggested command, if there is one.
         Of a capture, as in ``capture-inspect.json``.
+
+    Raises:
+        InputError: The mesh or capture cannot be used, or a capture is given what goes with a mesh.
     """
     from synfeal.captures.formats import is_capture
     from synfeal.inspection.captured import inspect_capture
@@ -654,6 +657,9 @@ def scan(
         gravity: Direction of gravity in the world of the poses; None to find it from the scene.
         keep_axes: Keep the axes of the poses' world.
         keep_calibration: Use the calibration of the photographs as given, without fitting it.
+
+    Raises:
+        InputError: The sequence cannot be used, or two arguments contradict each other.
     """
     from synfeal.scanning.run import ScanJob
     from synfeal.scanning.run import scan as fuse

@@ -86,7 +86,7 @@ class MapFrames:
         """Read a colour image (H, W, 3).
 
         Raises:
-            InputError: It cannot be read or has not the size of its camera.
+            InputError: It cannot be read or is of another size than its camera.
         """
         return self.rgbd.read_color(self.color[index])
 
@@ -94,7 +94,7 @@ class MapFrames:
         """Read a depth image (H, W) in metres, 0 where nothing was measured.
 
         Raises:
-            InputError: It cannot be read or has not the size of its camera.
+            InputError: It cannot be read or is of another size than its camera.
         """
         return self.rgbd.read_depth_m(self.depth[index])
 

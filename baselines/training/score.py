@@ -198,7 +198,11 @@ def _both_scores(poses: PoseTable, labels: PoseTable, truth: PoseTable) -> dict[
 
 
 def read_predictions(path: Path) -> PoseTable:
-    """Read a pose table whose poses may be ``nan``, unlike labels."""
+    """Read a pose table whose poses may be ``nan``, unlike labels.
+
+    Raises:
+        InputError: The file is missing or damaged, or has no rows.
+    """
     values = read_numbers(path, HEADER, "table of predictions", finite=False)
     if not len(values):
         raise InputError(path, "has no rows", "predict again")

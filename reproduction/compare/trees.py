@@ -107,7 +107,11 @@ def groups_of(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def compare_trees(root_a: Path, root_b: Path) -> Comparison:
-    """Compare every run that is in both trees."""
+    """Compare every run that is in both trees.
+
+    Raises:
+        InputError: The trees have no run in common.
+    """
     found_a, found_b = find_runs(root_a), find_runs(root_b)
     shared = [key for key in found_a if key in found_b]
     if not shared:
@@ -175,7 +179,18 @@ def _changes(path_a: Path, path_b: Path) -> pd.DataFrame | None:
 
 
 def find_runs(root: Path) -> dict[tuple[str, ...], list[Path]]:
-    """Find the directories of all seeds of every scored run of a tree, in order of name."""
+    """Find every scored training run of a results tree.
+
+    Args:
+        root: Results of a profile, such as ``results/mini``.
+
+    Returns:
+        The directories of the seeds of each run, in order of name, by what the run is (``KEY``):
+        scene, size, labels, init and model.
+
+    Raises:
+        InputError: There is no scored run.
+    """
     found: dict[tuple[str, ...], list[Path]] = {}
     for path in sorted(root.glob("runs/*/*/*/*/*/seed*/metrics.json")):
         key = path.parent.relative_to(root / "runs").parts[:-1]
@@ -191,7 +206,11 @@ def find_runs(root: Path) -> dict[tuple[str, ...], list[Path]]:
 
 
 def read_run(seeds: Sequence[Path]) -> RunErrors:
-    """Read the errors of a run from the directories of its seeds."""
+    """Read the errors of a run from the directories of its seeds.
+
+    Raises:
+        InputError: Seeds were tested on different frames.
+    """
     index = [_read_index(seed) for seed in seeds]
     for seed, found in zip(seeds, index, strict=True):
         if not np.array_equal(found, index[0]):

@@ -16,7 +16,15 @@ from synfeal.errors import InputError
 
 
 def parse_config(raw: Mapping[str, Any], origin: str = "config") -> Config:
-    """Check a merged mapping; an :class:`InputError` names ``origin`` and the first wrong key."""
+    """Check a configuration that was merged from files.
+
+    Args:
+        raw: Its keys and values.
+        origin: Files it comes from, for messages.
+
+    Raises:
+        InputError: A key is wrong; the first one is named.
+    """
     try:
         return Config.model_validate(dict(raw))
     except ValidationError as error:

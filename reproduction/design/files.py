@@ -17,7 +17,7 @@ from baselines.localizers.registry import backbone_of
 from reproduction.config.profile import Config
 from reproduction.config.robustness import MIXED
 from reproduction.design.experiments import Design, Run, common_every, split_init
-from reproduction.design.references import DataSet, answered_by, data_sets, has_structure
+from reproduction.design.references import DataSet, answered_by, data_sets, has_depth_frames
 from synfeal.config.dataset import RenderConfig
 from synfeal.config.effects import CLEAN, EffectsConfig
 from synfeal.dataset.frame_files import SUFFIX
@@ -70,7 +70,7 @@ class Files:
         """
         rows, references = self.design.rows, self.config.references
         labelled = {(scene, size) for scene, size, _ in self.design.estimated}
-        matched = {key for key in self.sizes if has_structure(rows, *key, references)}
+        matched = {key for key in self.sizes if has_depth_frames(rows, *key, references)}
         return sorted(labelled | matched)
 
     @cached_property
@@ -373,7 +373,7 @@ class Files:
     def has_robust_structure(self) -> bool:
         """Tell whether frames with depth are rendered of its data set."""
         robust = self.config.robustness
-        return has_structure(self.design.rows, robust.scene, robust.size, self.config.references)
+        return has_depth_frames(self.design.rows, robust.scene, robust.size, self.config.references)
 
     def robust_frames(self, split: str) -> int:
         """Count frames of a split of the robustness table's data set."""

@@ -39,7 +39,11 @@ def is_default(path: Path) -> bool:
 
 
 def profile_path(name: str) -> Path:
-    """Return the file of a profile, by name or path."""
+    """Return the file of a profile, by name or path.
+
+    Raises:
+        InputError: No profile has this name.
+    """
     if name.endswith((".yaml", ".yml")):
         return Path(name)
     paths = sorted(FOLDER.glob("*.yaml"))

@@ -19,10 +19,13 @@ def data_sets(rows: Iterable[Experiment]) -> list[DataSet]:
     return sorted({(row.scene, row.size, row.label_id) for row in rows})
 
 
-def has_structure(
+def has_depth_frames(
     rows: Iterable[Experiment], scene: str, size: str, references: ReferencesConfig
 ) -> bool:
-    """Tell whether methods that need frames with depth answer for a size.
+    """Tell whether large frames with depth are rendered for a size.
+
+    They are where labels are estimated from them. Reference methods that need them, if they are
+    asked for, answer there too, or have them rendered for all sizes.
 
     Args:
         rows: Rows of the design.
@@ -51,7 +54,7 @@ def answered_by(
     """
     rows, (scene, size, labels) = list(rows), data_set
     groups: set[Group] = {"images"}
-    if has_structure(rows, scene, size, references):
+    if has_depth_frames(rows, scene, size, references):
         same = [row for row in rows if (row.scene, row.size) == (scene, size)]
         papers = [row for row in same if row.table in PAPERS]
         few = worst(papers)

@@ -72,7 +72,16 @@ class Scored:
         return [read_errors(self._config.results / path, self._sfm) for path in poses]
 
     def cell(self, poses: Sequence[str]) -> dict[str, Any]:
-        """Compute all numbers of a cell."""
+        """Score a localizer on the part: the numbers of one row of the table.
+
+        Args:
+            poses: Its poses of the photographs, a file for each seed, below the results.
+
+        Returns:
+            Errors and shares with their limits (:func:`reproduction.real.scores.cell`), against
+            the given labels and, under names that end in ``_sfm``, against those of SfM; counts of
+            photographs tested, of blocks drawn and of frames fused.
+        """
         runs, others = self.errors(poses), self.by_sfm(poses)
         found: dict[str, Any] = cell(runs, self.draws)
         if others:

@@ -241,7 +241,11 @@ def rewritten(text: str, part: Callable[[str, str], str]) -> str:
 
 
 def part_of(name: str, profile: str) -> str:
-    """Generate a part of a page."""
+    """Generate a part of a page.
+
+    Raises:
+        InputError: There is no such part.
+    """
     if name not in PARTS:
         raise InputError(f"<!-- {name} {profile} -->: no such part; known: {', '.join(PARTS)}")
     return PARTS[name](PUBLISHED / (headline() if profile == "headline" else profile))

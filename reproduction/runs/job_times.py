@@ -24,7 +24,11 @@ REMEDY = "run that job again, or leave its measurement out"
 
 
 def read_measured(root: Path) -> pd.DataFrame:
-    """Read the jobs of a run from ``<root>/benchmarks``, else from ``<root>/benchmarks.csv``."""
+    """Read the jobs of a run from ``<root>/benchmarks``, else from ``<root>/benchmarks.csv``.
+
+    Raises:
+        InputError: The run has neither.
+    """
     folder, table = root / "benchmarks", root / "benchmarks.csv"
     paths = sorted(folder.rglob("*.tsv"))
     if paths:

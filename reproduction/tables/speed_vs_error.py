@@ -132,6 +132,9 @@ def collision_rows(root: Path, scene: str) -> pd.DataFrame:
 
     The curve holds each mesh's speed beside the full mesh's at the same moment. Only their ratio
     is free of what else the machine did, so it is applied to the full mesh's median speed.
+
+    Raises:
+        InputError: A speed is not above 0.
     """
     path = root / "scenes" / scene / "collision_curve.csv"
     values = read_numbers(path, CURVE_HEADER, "curve of the collision mesh")

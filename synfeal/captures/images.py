@@ -107,7 +107,11 @@ def existing(path: Path) -> Path | None:
 def confident(
     depth_m: Depth, confidence: NDArray[np.integer[Any]], least: int, place: object
 ) -> Depth:
-    """Return depth (H, W) with 0 where the confidence (H, W) is below the least."""
+    """Return depth (H, W) with 0 where the confidence (H, W) is below the least.
+
+    Raises:
+        InputError: The two differ in size; names ``place``.
+    """
     if confidence.shape != depth_m.shape:
         raise InputError(
             place, f"is of {confidence.shape[::-1]} pixels, its depth of {depth_m.shape[::-1]}"

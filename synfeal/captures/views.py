@@ -29,6 +29,9 @@ def pixel_map(source: Calibration, target: Calibration) -> Array:
     Returns:
         Pixels (H, W, 2) of the source, x first, (0.5, 0.5) the centre of its first; NaN where its
         lens does not reach.
+
+    Raises:
+        ValueError: The target is no pinhole camera.
     """
     column, row = np.meshgrid(np.arange(target.width), np.arange(target.height))
     pixel = np.stack([column, row], axis=-1).astype(np.float64) + 0.5

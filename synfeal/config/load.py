@@ -16,7 +16,11 @@ from synfeal.records.files import MOST_YAML_BYTES, PlainLoader, read_text
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Read a YAML mapping from a file."""
+    """Read a YAML mapping from a file.
+
+    Raises:
+        InputError: The file cannot be read, or holds something else.
+    """
     with read_as(path, "YAML", OSError, ValueError, RecursionError, yaml.YAMLError):
         text = read_text(path, most_bytes=MOST_YAML_BYTES)
         value = yaml.load(text, PlainLoader)  # noqa: S506 (a SafeLoader)

@@ -201,6 +201,9 @@ def encode_png(pixels: Pixels, text: Mapping[str, str] | None = None) -> bytes:
     Args:
         pixels: Colours (H, W, 3) uint8 or grey values (H, W) uint16.
         text: Texts by keyword, both of Latin-1; :func:`decode_png` leaves such files to Pillow.
+
+    Raises:
+        ValueError: The pixels are neither.
     """
     is_rgb = pixels.ndim == 3 and pixels.shape[2] == 3 and pixels.dtype == np.uint8
     if not is_rgb and not (pixels.ndim == 2 and pixels.dtype == np.uint16):

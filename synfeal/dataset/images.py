@@ -91,7 +91,12 @@ def decode_image(
     most_pixels: int = MOST_PIXELS,
     remedy: str = "",
 ) -> Image.Image:
-    """Decode the bytes of an image; ``place`` names it in messages, see :func:`read_image`."""
+    """Decode the bytes of an image; ``place`` names it in messages, see :func:`read_image`.
+
+    Raises:
+        InputError: The image is damaged, of another size, or none of 8-bit colours where ``mode``
+            asks for one.
+    """
     image = _decoded(content, place, formats, most_pixels, remedy)
     if size is not None and image.size != size:
         raise InputError(

@@ -57,7 +57,11 @@ def pack_frames(
 
 
 def join_packed(parts: list[Path], out: Path) -> None:
-    """Write packed frames of one size one after the other into one file; a few are in memory."""
+    """Write packed frames of one size one after the other into one file; a few are in memory.
+
+    Raises:
+        InputError: A file is no packed frames, or of another size than the first.
+    """
     arrays = [read_packed(path) for path in parts]
     input_px = arrays[0].shape[1]
     for path, array in zip(parts, arrays, strict=True):
@@ -74,7 +78,11 @@ def join_packed(parts: list[Path], out: Path) -> None:
 
 
 def read_packed(path: Path) -> np.memmap[Any, np.dtype[np.uint8]]:
-    """Open packed frames (N, S, S, 3) as a memory map."""
+    """Open packed frames (N, S, S, 3) as a memory map.
+
+    Raises:
+        InputError: The file is missing or damaged, or holds something else.
+    """
     # A damaged header is refused in every way there is.
     with read_as(path, "packed frames", Exception, remedy="; render it again"):
         frames: np.memmap[Any, np.dtype[np.uint8]] = np.lib.format.open_memmap(path, mode="r")

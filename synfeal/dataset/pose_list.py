@@ -70,7 +70,10 @@ class PoseList:
 
     @property
     def counts_seconds(self) -> bool:
-        """Check whether times are 0, 1, 2, ..., in one sequence or each: they may be numbers."""
+        """Check whether times are 0, 1, 2, ..., in one sequence or each.
+
+        They may then be numbers of frames, which somebody wrote where seconds should be.
+        """
         if self.frame_key != "time" or len(self.names) < 2:
             return False
         stamps = [name.rpartition("/")[2] for name in self.names]

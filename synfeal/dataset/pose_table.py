@@ -68,7 +68,11 @@ class PoseTable:
         return np.flatnonzero(self.registered)
 
     def between(self, start: int, stop: int) -> PoseTable:
-        """Return frames ``start`` to ``stop`` (exclusive), which must all exist."""
+        """Return frames ``start`` to ``stop`` (exclusive), which must all exist.
+
+        Raises:
+            ValueError: One does not.
+        """
         if not 0 <= start <= stop <= len(self):
             raise ValueError(f"asked for frames {start} to {stop} of a table of {len(self)}")
         edges = np.concatenate([[0], np.flatnonzero(np.diff(self.path)) + 1, [len(self)]])
@@ -143,7 +147,11 @@ def read_pose_table(path: Path, any_frames: bool = False) -> PoseTable:
 
 
 def read_frames(path: Path, start: int, stop: int) -> PoseTable:
-    """Read the frames ``start`` to ``stop`` (exclusive) of a pose table that has as many."""
+    """Read the frames ``start`` to ``stop`` (exclusive) of a pose table that has as many.
+
+    Raises:
+        InputError: The table holds fewer than ``stop`` poses.
+    """
     table = read_pose_table(path)
     if len(table) < stop:
         raise InputError(path, f"holds {len(table)} poses, {stop} are needed", "make it again")
@@ -151,7 +159,11 @@ def read_frames(path: Path, start: int, stop: int) -> PoseTable:
 
 
 def whole_numbers(values: NDArray[np.float64], path: Path) -> NDArray[np.int64]:
-    """Convert the leading columns (N, C) of a table to indices: whole numbers, 0 or above."""
+    """Convert the leading columns (N, C) of a table to indices: whole numbers, 0 or above.
+
+    Raises:
+        InputError: A value is something else; names its row in ``path``.
+    """
     good = ((values >= 0) & (values < 2**53) & (values == np.floor(values))).all(axis=1)
     if not good.all():
         row = int(np.argmin(good)) + 2

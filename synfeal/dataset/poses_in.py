@@ -270,7 +270,11 @@ def _from_directory(path: Path) -> PoseList:
 
 
 def read_sevenscenes(path: Path) -> PoseList:
-    """Read a tree of ``pose.txt`` files."""
+    """Read a tree of ``pose.txt`` files.
+
+    Raises:
+        InputError: It holds no such file.
+    """
     sequences = list_sequences(path)
     refuse_problems(sequences)
     frames = [
@@ -291,7 +295,11 @@ def read_sevenscenes(path: Path) -> PoseList:
 
 
 def read_csv(path: Path, text: str) -> PoseList:
-    """Read a table of poses with a header."""
+    """Read a table of poses with a header.
+
+    Raises:
+        InputError: The header is none that is known, or no pose is below it.
+    """
     table = parse_cells(path, text, remedy="correct the file")
     found = (IMAGE, *COLUMNS[2:])
     known = (COLUMNS, (*COLUMNS, IMAGE), found, (*found, *SUPPORT), (*found, *SEEN))
@@ -464,7 +472,11 @@ def _quat_of_rotations(matrices: Array) -> Array:
 
 
 def read_tum_sequences(paths: Sequence[Path]) -> PoseList:
-    """Read ``seq-01.txt``, ``seq-02.txt``, ..., each a TUM trajectory."""
+    """Read ``seq-01.txt``, ``seq-02.txt``, ..., each a TUM trajectory.
+
+    Raises:
+        InputError: A file is no TUM trajectory.
+    """
     parts = [read_pose_list(path) for path in paths]
     odd = [p for p, part in zip(paths, parts, strict=True) if part.convention != TUM]
     if odd:

@@ -104,6 +104,9 @@ def encoder() -> str:
     """Find the program that encodes films: the system's, or that of the wheel ``imageio-ffmpeg``.
 
     It is run as a program of its own, so its licence (GPL, for x264) does not reach this one.
+
+    Raises:
+        InputError: Neither is there.
     """
     found = shutil.which("ffmpeg")
     if found is None and importlib.util.find_spec("imageio_ffmpeg") is not None:

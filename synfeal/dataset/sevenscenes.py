@@ -50,7 +50,12 @@ def pose_file_text(path: FrameFile) -> str:
 
 
 def read_pose(path: FrameFile) -> NDArray[np.float64]:
-    """Read a pose (4, 4) from a file of sixteen finite numbers in four rows."""
+    """Read a pose (4, 4) from a file of sixteen finite numbers in four rows.
+
+    Raises:
+        InputError: The file cannot be read, or holds something else or a place that is too far
+            away.
+    """
     with read_as(path, "a pose"):
         rows = [line.split() for line in pose_file_text(path).splitlines() if line]
         pose = np.array(rows, np.float64)
@@ -129,7 +134,11 @@ def write_splits(dataset_dir: Path, sequences: Iterable[Sequence]) -> None:
 
 
 def read_split(dataset_dir: Path, split: str) -> list[Path]:
-    """List the sequences of a split in order, each as a directory or an archive."""
+    """List the sequences of a split in order, each as a directory or an archive.
+
+    Raises:
+        InputError: The list is missing, names what is no sequence, or names one twice.
+    """
     path = dataset_dir / SPLIT_FILES[split]
     if not os.path.lexists(path):
         raise InputError(path, "missing; a 7-Scenes data set has one")

@@ -142,7 +142,15 @@ def with_limits(samples: Mapping[str, Array]) -> Metrics:
 
 
 def draws(path: NDArray[np.int64]) -> tuple[NDArray[np.intp], Counts]:
-    """Return the column (N,) of each frame's path, and how often each resample takes each path."""
+    """Draw whole paths with replacement, for the limits of any mean or median over frames.
+
+    Args:
+        path: Index (N,) of each frame's path.
+
+    Returns:
+        The column (N,) of each frame's path, and how often each resample takes each path (B, P);
+        the first resample takes every path once.
+    """
     _, place = np.unique(path, return_inverse=True)
     n_paths = int(place.max()) + 1
     return place, path_counts(n_paths, generator_of("bootstrap", len(path)), RESAMPLES)

@@ -133,7 +133,11 @@ def write_cell_depth(path: Path, depth_m: Array) -> None:
 
 
 def read_cell_depth(path: Path, n_frames: int) -> Array:
-    """Read depths (n_frames, 48) of the first frames of a file; ``inf`` where nothing is."""
+    """Read depths (n_frames, 48) of the first frames of a file; ``inf`` where nothing is.
+
+    Raises:
+        InputError: The file cannot be read, holds something else, or fewer frames.
+    """
     with read_as(path, "depths", OSError, ValueError, EOFError, remedy="; make it again"):
         # A map is refused where the header claims more than the file holds; an array is not.
         depth_mm = np.load(path, mmap_mode="r", allow_pickle=False)

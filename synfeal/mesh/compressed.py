@@ -248,6 +248,9 @@ def decode_meshopt(data: bytes, stored: Json) -> bytes:
     """Decompress a view that meshoptimizer compressed.
 
     ``stored`` is its extension: ``count``, ``byteStride``, ``mode`` and ``filter``.
+
+    Raises:
+        ValueError: It claims to hold more than these bytes can.
     """
     import meshoptimizer as meshopt
 
@@ -274,7 +277,11 @@ def fractions(values: Values, accessor: Json) -> NDArray[np.float32]:
 
 
 def png_of_ktx2(content: bytes) -> bytes:
-    """Transcode the largest level of a KTX2 texture (Basis Universal, ETC1S or UASTC) to PNG."""
+    """Transcode the largest level of a KTX2 texture (Basis Universal, ETC1S or UASTC) to PNG.
+
+    Raises:
+        ValueError: It is too large to be read.
+    """
     import opengl_basisu
 
     width, height = struct.unpack_from("<II", content, KTX2_SIDES)

@@ -81,6 +81,9 @@ def read_poses(source: Path, split: str) -> PoseTable:
     of its frames (``frame-XXXXXX.pose.txt``), a pose table (``.csv``) or a trajectory in the
     format of the TUM benchmark (``.txt``). The last three hold one list of poses, which is the
     training split. Each sequence and each trajectory is one path, where no table says otherwise.
+
+    Raises:
+        InputError: ``source`` is nothing of these, or has no such split.
     """
     if (source / f"{split}.csv").is_file():
         return read_pose_table(source / f"{split}.csv")

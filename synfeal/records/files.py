@@ -246,6 +246,9 @@ def writing_to(path: Path, remedy: Callable[[], str]) -> Iterator[None]:
     """Say in one line that a file could not be written: a full disk, a read-only one.
 
     In place of any ``OSError``; names ``path`` where the system names no file, and what to do then.
+
+    Raises:
+        InputError: The block raised an ``OSError``.
     """
     try:
         yield

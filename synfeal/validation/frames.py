@@ -113,8 +113,13 @@ def check_images(
 
 
 def _other_units(sequence: SequenceListing, camera: CameraConfig) -> list[str]:
-    """Compare the units that the first depth image of a sequence says with those of the camera."""
-    file = sequence.frames[0].path(DEPTH)
+    """Compare the units that the first depth image of a sequence says with those of the camera.
+
+    Returns:
+        The failure, if they differ.
+    """
+    first = min(sequence.numbers[DEPTH])  # depth of the first frame may be what is missing
+    file = Frame(sequence.path, first).path(DEPTH)
     try:
         said = own_units_per_m(file) or MILLIMETRES
     except InputError:

@@ -93,6 +93,10 @@ def test_validate_finds_nothing_wrong_and_a_wrong_unit_at_once(far, tmp_path, ca
     assert main(["validate", str(wrong)]) == 1
     said = capfd.readouterr().err
     assert "a metre is stored as 200, the manifest (camera.depth_units_per_m) 1000" in said
+    (wrong / "seq-01" / "frame-000000.depth.png").unlink()  # the first of the others says it then
+    assert main(["validate", str(wrong)]) == 1
+    said = capfd.readouterr().err
+    assert "frame-000001.depth.png: says that a metre is stored as 200" in said
 
 
 def test_what_is_exported_is_as_far_away(far, tmp_path, caplog):

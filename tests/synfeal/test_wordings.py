@@ -1,11 +1,13 @@
 """Lines for a person: refusals in our own words, progress, and the end of a command."""
 
+import ast
 import errno
 import os
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -172,3 +174,45 @@ def test_sigterm_leaves_handlers_as_they_were():
     began = time.monotonic()
     assert exit_status(lambda: os.kill(os.getpid(), signal.SIGTERM) or time.sleep(9), "") == 143
     assert time.monotonic() - began < 9
+
+
+ROOT = Path(__file__).parents[2]
+# Named for what they raise; commands end in the errors of what they call.
+SELF_EVIDENT = ("refuse", "check", "_")
+COMMANDS = ("synfeal/cli/", "baselines/cli/", "reproduction/cli.py")
+# Read whole by the hash of the frozen rules.
+FROZEN = ("reproduction/claims/", "reproduction/statistics/seeds.py")
+
+
+def raised_by(function):
+    """Names of the exceptions that a function raises itself, not in functions inside it."""
+    names, waiting = set(), list(function.body)
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+            names.add(ast.unparse(node.exc.func))
+        if not isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Lambda):
+            waiting.extend(ast.iter_child_nodes(node))
+    return names
+
+
+def test_functions_say_which_refusals_they_raise():
+    silent = []
+    for path in sorted(ROOT.glob("*/**/*.py")):
+        place = path.relative_to(ROOT).as_posix()
+        if not place.startswith(("synfeal/", "baselines/", "reproduction/")):
+            continue
+        if place.startswith((*COMMANDS, *FROZEN)):
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.FunctionDef) or node.name.startswith(SELF_EVIDENT):
+                continue
+            told = ast.get_docstring(node)
+            if (
+                told
+                and not told.startswith("Refuse")
+                and "InputError" in raised_by(node)
+                and "InputError:" not in told
+            ):
+                silent.append(f"{place}: {node.name}")
+    assert silent == []

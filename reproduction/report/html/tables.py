@@ -136,7 +136,11 @@ Claims = Sequence[Mapping[str, str]]
 
 
 def read_claims(path: Path) -> Claims:
-    """Read the rows of ``claims.csv``."""
+    """Read the rows of ``claims.csv``.
+
+    Raises:
+        InputError: A verdict is none of those there are.
+    """
     rows = records_of(read_frame(path, dict.fromkeys(COLUMNS, TEXT)))
     for row in rows:
         for score in SCORES:
