@@ -67,6 +67,9 @@ class PoseList:
     quat: Array
     frame_key: FrameKey = "name"
     of_matrices: bool = False  # whether the file has matrices in place of quaternions
+    # (N, 4) radii that the file states, columns of ``STATED``, NaN where it states none; None of a
+    # file without these columns
+    stated: Array | None = None
 
     @property
     def counts_seconds(self) -> bool:

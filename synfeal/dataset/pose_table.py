@@ -29,6 +29,8 @@ IMAGE = "image"
 SUPPORT = ("status", "inliers", "confidence")
 # Further columns of poses that a network gave: whether it has seen the like of a picture.
 SEEN = ("status", "typicality", "outside_m")
+# Further columns of poses whose error is stated: radii that hold 68 and 95 % of the errors.
+STATED = ("position_sd_m", "position_95_m", "orientation_sd_deg", "orientation_95_deg")
 UNIT_TOLERANCE = 1e-2
 FARTHEST_GUESS_M = 1e100  # a network that diverged; its square is still finite
 

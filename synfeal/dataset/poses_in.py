@@ -41,7 +41,15 @@ from synfeal.dataset.pose_models import (
     read_colmap,
     read_kapture,
 )
-from synfeal.dataset.pose_table import COLUMNS, IMAGE, SEEN, SUPPORT, check_places, check_unit
+from synfeal.dataset.pose_table import (
+    COLUMNS,
+    IMAGE,
+    SEEN,
+    STATED,
+    SUPPORT,
+    check_places,
+    check_unit,
+)
 from synfeal.dataset.sequence_listing import POSE, list_sequences, refuse_problems
 from synfeal.dataset.sevenscenes import read_pose
 from synfeal.errors import InputError, read_as
@@ -302,8 +310,12 @@ def read_csv(path: Path, text: str) -> PoseList:
     """
     table = parse_cells(path, text, remedy="correct the file")
     found = (IMAGE, *COLUMNS[2:])
+    bare = table.header
+    states_errors = bare[-len(STATED) :] == STATED
+    if states_errors:
+        bare = bare[: -len(STATED)]
     known = (COLUMNS, (*COLUMNS, IMAGE), found, (*found, *SUPPORT), (*found, *SEEN))
-    if table.header not in known:
+    if bare not in known:
         raise InputError(
             path,
             f"the header must be {','.join(COLUMNS)} or image,{','.join(COLUMNS[2:])}, found"
@@ -312,7 +324,7 @@ def read_csv(path: Path, text: str) -> PoseList:
     table.check_rows()
     if not table.rows:
         raise InputError(path, "holds no poses below its header")
-    may_be_empty = table.header[-1] == SUPPORT[-1]  # no pose, no numbers
+    may_be_empty = bare[-1] == SUPPORT[-1]  # no pose, no numbers
     values = table.numbers(COLUMNS[2:], may_be_empty)
     named = IMAGE in table.header
     names = table.header.index(IMAGE if named else "frame")
@@ -324,6 +336,7 @@ def read_csv(path: Path, text: str) -> PoseList:
         values[:, :3],
         values[:, 3:],
         frame_key="name" if named else "index",
+        stated=table.numbers(STATED, may_be_empty=True) if states_errors else None,
     )
 
 

@@ -21,6 +21,7 @@ from synfeal.dataset.sequence_listing import DEPTH
 from synfeal.errors import Argument, InputError, why
 from synfeal.evaluation.bootstrap import FEWEST_PATHS
 from synfeal.evaluation.captured import captured_frames
+from synfeal.evaluation.coverage import Coverage, coverage
 from synfeal.evaluation.estimates import checked_convention
 from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
@@ -78,6 +79,9 @@ class Evaluation:
     errors: dict[str, Array]
     metrics: Metrics  # medians, means, recalls, with limits where there are enough paths
     scales: dict[str, float]  # by ending, the scale of the alignment
+    # of ``position_m`` and ``orientation_deg``, and the same ending in ``_labels``: how stated
+    # radii fit the errors of the frames that have both; empty where none are stated
+    coverage: dict[str, list[Coverage]]
 
     @property
     def ends(self) -> tuple[str, ...]:
@@ -138,8 +142,46 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
         if not (row >= 0).any() or np.isnan(estimates.translation[row[row >= 0]]).all():
             raise InputError(poses, "holds no pose of these frames, none of them was localized")
         raise InputError(poses, "none of its poses is a rotation and a position")
-    metrics = _metrics(errors, yardsticks, frames)
-    return Evaluation(frames, estimates, convention, row, rotations, errors, metrics, scales)
+    return Evaluation(
+        frames=frames,
+        estimates=estimates,
+        convention=convention,
+        row=row,
+        rotations=rotations,
+        errors=errors,
+        metrics=_metrics(errors, yardsticks, frames),
+        scales=scales,
+        coverage=_coverage(poses, estimates, row, errors, scales),
+    )
+
+
+def _coverage(
+    path: Path,
+    estimates: PoseList,
+    row: NDArray[np.int64],
+    errors: Mapping[str, Array],
+    scales: Mapping[str, float],
+) -> dict[str, list[Coverage]]:
+    """Compare errors with the radii that the file states, if it states any."""
+    if estimates.stated is None:
+        return {}
+    bad = np.flatnonzero((estimates.stated <= 0).any(axis=1))
+    if len(bad):
+        raise InputError(
+            path,
+            f"{estimates.places[bad[0]]}: states an error of"
+            f" {estimates.stated[bad[0]].min():g}, which must be above 0",
+            "leave it empty where it is not known",
+        )
+    stated = np.where((row >= 0)[:, None], estimates.stated[row], np.nan)
+    found = {}
+    for end, scale in scales.items():
+        for name, radius in ((POSITION, scale * stated[:, :2]), (ORIENTATION, stated[:, 2:])):
+            error = errors[name + end]
+            both = np.isfinite(radius).all(axis=1) & np.isfinite(error)
+            if both.any():
+                found[name + end] = coverage(error[both], *radius[both].T)
+    return found
 
 
 def _refuse_useless(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from synfeal.evaluation.coverage import Coverage
 from synfeal.evaluation.metrics import (
     BOUNDS,
     MEANS,
@@ -24,6 +25,7 @@ from synfeal.records.files import atomic_path
 from synfeal.records.tables import write_frame
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SHOWN = 3  # frames named where some are missing
@@ -48,17 +50,30 @@ def rows_of(found: Evaluation) -> list[tuple[str, str, str, float]]:
 
 def scores_table(found: Evaluation) -> pd.DataFrame:
     """Tabulate the scores, one per row: ``score,against,value,low,high``."""
-    return pd.DataFrame(
+    scores = [
         {
             "score": key,
-            "against": "labels" if end else "dataset",
+            "against": _against(end),
             "value": found.metrics.get(f"{key}{end}"),
             "low": found.metrics.get(f"{key}{end}_low"),
             "high": found.metrics.get(f"{key}{end}_high"),
         }
         for end in found.ends
         for _, key, _, _ in rows_of(found)
-    ).astype({"value": float, "low": float, "high": float})
+    ]
+    for end in found.ends:
+        for name in (POSITION, ORIENTATION):
+            for one in found.coverage.get(name + end, []):
+                values = {"held": one.held, "stated_over_needed": one.width}
+                for what, value in values.items():
+                    score = f"{name}_{100 * one.level:.0f}_{what}"
+                    scores.append({"score": score, "against": _against(end), "value": value})
+    columns = ["score", "against", "value", "low", "high"]
+    return pd.DataFrame(scores, columns=columns).astype(dict.fromkeys(columns[2:], float))
+
+
+def _against(end: str) -> str:
+    return "labels" if end else "dataset"
 
 
 def report_text(poses: Path, settings: Settings, found: Evaluation) -> str:
@@ -79,7 +94,24 @@ def report_text(poses: Path, settings: Settings, found: Evaluation) -> str:
     for row in [["", *heads], *rows]:
         cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
         lines += ["  ".join(cells).rstrip()]
+    lines += _coverage_lines(found)
     return "\n".join(lines) + "\n"
+
+
+def _coverage_lines(found: Evaluation) -> list[str]:
+    """Say how many errors lie within their stated radii, and how wide these are."""
+    if not found.coverage:
+        return []
+    lines = ["", "stated errors: held (stated radius over needed)"]
+    for end in found.ends:
+        for name, title in ((POSITION, "position"), (ORIENTATION, "orientation")):
+            if (name + end) in found.coverage:
+                cells = [
+                    f"{100 * one.level:.0f} %: {100 * one.held:.1f} % ({one.width:.2f})"
+                    for one in found.coverage[name + end]
+                ]
+                lines.append(f"{title}, {TITLES[end]}: {', '.join(cells)}")
+    return lines
 
 
 def _findings(poses: Path, settings: Settings, found: Evaluation) -> list[str]:
@@ -136,13 +168,18 @@ LEAST = 1e-6  # where an error of nothing is drawn on a logarithmic axis
 
 
 def figure_of(title: str, found: Evaluation) -> Figure:
-    """Draw three panels: position, orientation, and both at once (x cm and x°)."""
+    """Draw three panels: position, orientation, and both at once (x cm and x°).
+
+    A fourth one, where errors are stated: how many of them the radii of each level hold.
+    """
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    n_panels = 4 if found.coverage else 3
+    figure = Figure(figsize=(11 / 3 * n_panels, 3.8), layout="constrained")
     figure.suptitle(title, fontsize=10)
-    panels = figure.subplots(1, 3, sharey=True)
+    every = figure.subplots(1, n_panels, sharey=True)
+    panels = every[:3]
     labels = ("position error (m)", "orientation error (°)", "both errors: below x cm and x°")
     for end, color, dash in zip(found.ends, COLORS, DASHES, strict=False):
         shown = found.errors[POSITION + end], found.errors[ORIENTATION + end]
@@ -160,7 +197,32 @@ def figure_of(title: str, found: Evaluation) -> Figure:
     panels[0].set_ylabel("frames with at most this error (%)")
     if len(found.ends) > 1:
         panels[0].legend(frameon=False, fontsize=8)
+    if found.coverage:
+        _draw_coverage(every[3], found)
     return figure
+
+
+def _draw_coverage(axes: Axes, found: Evaluation) -> None:
+    """Draw the share of errors within radii against the share that these are said to hold."""
+    axes.plot([0, 100], [0, 100], color="0.6", linewidth=0.8)
+    for end, dash in zip(found.ends, DASHES, strict=False):
+        for name, title, color in zip(
+            (POSITION, ORIENTATION), ("position", "orientation"), COLORS, strict=True
+        ):
+            drawn: list[Coverage] = found.coverage.get(name + end, [])
+            label = f"{title}, {TITLES[end]}" if len(found.ends) > 1 else title
+            axes.plot(
+                [100 * one.level for one in drawn],
+                [100 * one.held for one in drawn],
+                dash,
+                marker="o",
+                markersize=3,
+                color=color,
+                label=label,
+            )
+    axes.set(xlim=(40, 101), xlabel="level of the stated radius (%)")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False, fontsize=8)
 
 
 FILES = ("scores.csv", "errors.csv", "errors.png")
