@@ -146,6 +146,7 @@ def map(  # noqa: A001 (the name of the command)
     from baselines.references.captured import as_sequence
     from baselines.references.map_frames import FrameChoice, read_map_frames
     from baselines.references.mapped import build_map
+    from baselines.references.stated_errors import write_trial
     from synfeal.api import rgbd_cameras
 
     _check_seed(seed)
@@ -164,7 +165,10 @@ def map(  # noqa: A001 (the name of the command)
         frames = read_map_frames(
             folder=sequence.folder, choice=choice, cameras=cameras, poses_are=convention
         )
-        return build_map(sequence.named(frames), Path(out), seed)
+        named = sequence.named(frames)
+        made = build_map(named, Path(out), seed)
+        write_trial(made, named, Path(out), seed)
+        return made
 
 
 def build(

@@ -95,6 +95,12 @@ def report_localized(arguments: argparse.Namespace, done: LocalizedInMap) -> Non
             done.n_ambiguous,
             done.n_images,
         )
+    if not done.states_errors:
+        log.warning(
+            "poses state no error: %s was not tried on frames of its own, or found too few of"
+            " them; the same synfeal build, or synfeal map into another folder, tries it",
+            arguments.model,
+        )
     if done.n_found == 0 and not done.n_ambiguous:
         log.warning("is it another place, or is the focal length of the photographs wrong?")
     print(f"{arguments.model}: {done.n_frames} frames, {done.n_points} features")

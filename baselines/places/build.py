@@ -20,12 +20,14 @@ from baselines.places.check import (
     localize_known,
     photographs_of,
     renderings_of,
+    trial_of,
 )
 from baselines.places.choices import choose, stride_of
 from baselines.places.place import Place, is_place
 from baselines.places.report import write_report
 from baselines.references.map_frames import FrameChoice, read_map_frames
-from baselines.references.mapped import build_map
+from baselines.references.mapped import build_map, read_map
+from baselines.references.stated_errors import TRIED, write_trial
 from synfeal.captures.capture import Capture
 from synfeal.captures.formats import capture_formats, read_capture
 from synfeal.captures.unpack import read_capture_record, unpack
@@ -39,9 +41,10 @@ from synfeal.scanning.run import ScanJob, scan
 
 log = logging.getLogger("synfeal")
 
-UNPACK, SCAN, RENDER, MAP, CHECK, TRAIN = "unpack", "scan", "render", "map", "check", "train"
+UNPACK, SCAN, RENDER, MAP = "unpack", "scan", "render", "map"
+TRIAL, CHECK, TRAIN = "trial", "check", "train"
 # Seconds of one core for one frame, or in all: only their ratios matter much, see Outlook.
-FRAME_S = {UNPACK: 0.15, SCAN: 1.0, RENDER: 0.15, MAP: 0.15, CHECK: 0.3}
+FRAME_S = {UNPACK: 0.15, SCAN: 1.0, RENDER: 0.15, MAP: 0.15, TRIAL: 0.3, CHECK: 0.3}
 TRAIN_S = 120.0
 # Depth is drawn of the full mesh for every frame anyway; choosing less of it for colours takes
 # longer than a thousand frames save.
@@ -128,14 +131,21 @@ def build(job: PlaceJob, say: Callable[[str], None] = print) -> dict[str, Any]:
         record["notes"] = list(_unpack(job, place, capture, run)) or record.get("notes", [])
         write_json(place.record, record)
         known, record["scan"] = _render_scan(job, place, run)
+    choice, camera = FrameChoice(most=job.frames), CameraOptions()
     with run.stage(MAP, place.map, "map") as due:
         if due:
-            frames = FrameChoice(most=job.frames)
-            build_map(read_map_frames(place.rendered, frames, CameraOptions()), place.map, job.seed)
+            build_map(read_map_frames(place.rendered, choice, camera), place.map, job.seed)
+    with run.stage(TRIAL, place.trial, "map tried on frames left out of it") as due:
+        if due:
+            frames = read_map_frames(place.rendered, choice, camera)
+            write_trial(read_map(place.map), frames, place.map, job.seed)
+            # An earlier version's, whose poses state no error.
+            place.check.unlink(missing_ok=True)
     with run.stage(CHECK, place.check, f"map tried on {known.kind}") as due:
         if due:
             localize_known(place, known, job.seed)
     record["check"] = check_of(place, known)
+    record["trial"] = trial_of(place)
     if job.train:
         record["localizer"] = _train(job, place, run)
     record["finished"] = True
@@ -160,6 +170,7 @@ def _expected_s(job: PlaceJob, n_captured: int) -> dict[str, float]:
         **({} if job.is_mesh else captured),
         RENDER: FRAME_S[RENDER] * job.frames / job.cores,
         MAP: FRAME_S[MAP] * job.frames,
+        TRIAL: FRAME_S[TRIAL] * min(TRIED, job.frames),
         CHECK: FRAME_S[CHECK] * CHECKED,
         **({TRAIN: TRAIN_S} if job.train else {}),
     }

@@ -15,10 +15,14 @@ import synfeal
 from baselines.places.place import Place
 from baselines.references.localized import localize_in_map
 from baselines.references.map_localizer import FOUND
+from baselines.references.stated_errors import held_out_coverage, read_trial
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.dataset.manifest import MANIFEST
+from synfeal.dataset.pose_table import STATED
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError
+from synfeal.evaluation.coverage import coverage
+from synfeal.evaluation.metrics import ORIENTATION, POSITION
 from synfeal.geometry.poses import pose_error, pose_from_quat
 
 Array = NDArray[np.float64]
@@ -87,8 +91,8 @@ def check_of(place: Place, known: Known) -> dict[str, Any]:
 
     Returns:
         Counts; medians and 90 % of the errors of the pictures that were localized; the share of all
-        that are within 5 cm and 5 degrees; for each picture its known position and its error, None
-        where it was not localized.
+        that are within 5 cm and 5 degrees; how the errors that poses state fit theirs; for each
+        picture its known position and its error, None where it was not localized.
 
     Raises:
         InputError: The file names other pictures.
@@ -111,6 +115,7 @@ def check_of(place: Place, known: Known) -> dict[str, Any]:
         "position_90_m": _percentile(position_m[found], 90),
         "orientation_deg": _percentile(angle_deg[found], 50),
         "within_5cm_5deg": float(close.mean()),
+        "stated": _stated_of(table, {POSITION: position_m, ORIENTATION: angle_deg}),
         "places": [
             {
                 "position_m": pose[:3, 3].round(3).tolist(),
@@ -119,6 +124,33 @@ def check_of(place: Place, known: Known) -> dict[str, Any]:
             for pose, error in zip(truth, position_m, strict=True)
         ],
     }
+
+
+def trial_of(place: Place) -> dict[str, Any]:
+    """Say how the map did on frames left out of it.
+
+    Returns:
+        Counts, and how the errors that one half states fit those of the other; nothing of that
+        where there are few.
+    """
+    trial = read_trial(place.map)
+    found = held_out_coverage(trial)
+    return {
+        "pictures": trial.tried,
+        "localized": len(trial.position_m),
+        "stated": {name: [one._asdict() for one in levels] for name, levels in found.items()},
+    }
+
+
+def _stated_of(table: pd.DataFrame, errors: dict[str, Array]) -> dict[str, Any]:
+    """Compare errors (N,) with the radii that the lines of ``check.csv`` state, if they do."""
+    found = {}
+    for (name, error), columns in zip(errors.items(), (STATED[:2], STATED[2:]), strict=True):
+        radii = table.reindex(columns=list(columns)).to_numpy(np.float64)
+        known = np.isfinite(radii).all(axis=1) & np.isfinite(error)
+        if known.any():
+            found[name] = [one._asdict() for one in coverage(error[known], *radii[known].T)]
+    return found
 
 
 def _rows_of(images: Iterable[str], known: Known, place: Place) -> list[int]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from baselines.references.stated_errors import FILE as TRIAL
 from synfeal.camera.calibration import read_calibration
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.captures.unpack import RECORD as CAPTURE_RECORD
@@ -54,6 +55,11 @@ class Place:
     def map(self) -> Path:
         """Map that photographs are localized in."""
         return self.folder / "map"
+
+    @property
+    def trial(self) -> Path:
+        """Errors of frames that the map was tried on, by which poses state theirs."""
+        return self.map / TRIAL
 
     @property
     def check(self) -> Path:

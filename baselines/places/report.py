@@ -21,6 +21,8 @@ from synfeal.records.files import atomic_path, read_json
 # Widest picture of the page, pixels, and its quality as JPEG: the page is one file to send.
 WIDEST_PX, QUALITY = 1600, 85
 PLAN_PX, EDGE_PX = 640.0, 14.0
+# Side of the plot of stated errors, and the share at which its axes begin.
+STATED_PX, LEAST_SHARE = 260.0, 0.4
 SCALE_STEPS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 
 
@@ -31,6 +33,18 @@ class Dot(NamedTuple):
     y_px: float
     kind: str
     error_m: float | None
+
+
+class CoverageLine(NamedTuple):
+    """A line of the plot of stated errors.
+
+    Attributes:
+        kind: Classes of the line: ``trial`` or ``check``, and ``position`` or ``orientation``.
+        points: Corners of the line in pixels, as SVG writes them.
+    """
+
+    kind: str
+    points: str
 
 
 class Plan(NamedTuple):
@@ -70,11 +84,35 @@ def write_report(place: Place, record: dict[str, Any]) -> None:
         picture=picture_data(shown),
         plan=plan_of(record["check"]["places"], world_from_check),
         plan_px=PLAN_PX,
+        lines=coverage_lines(record),
+        stated_px=STATED_PX,
+        edge_px=EDGE_PX,
         close_cm=100 * CLOSE_M,
         folder=place.folder,
     )
     with atomic_path(place.report) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def coverage_lines(record: dict[str, Any]) -> tuple[CoverageLine, ...]:
+    """Draw the share of errors within stated radii against the share that these are said to hold.
+
+    Args:
+        record: Content of ``place.json``.
+    """
+    lines = []
+    for of in ("trial", "check"):
+        for name, levels in record[of]["stated"].items():
+            corners = [(_along_px(one["level"]), _along_px(one["held"])) for one in levels]
+            points = " ".join(f"{x:.1f},{STATED_PX - y:.1f}" for x, y in corners)
+            lines.append(CoverageLine(f"{of} {name.partition('_')[0]}", points))
+    return tuple(lines)
+
+
+def _along_px(share: float) -> float:
+    """Place a share on an axis of the plot of stated errors."""
+    along = (max(share, LEAST_SHARE) - LEAST_SHARE) / (1.0 - LEAST_SHARE)
+    return EDGE_PX + (STATED_PX - 2 * EDGE_PX) * along
 
 
 def picture_data(path: Path) -> str:

@@ -83,6 +83,19 @@ class Support(NamedTuple):
 NO_SUPPORT = Support(inliers=0, patches=0, tried=0, chance=1.0)
 
 
+def patches_of(pixel: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.int64]:
+    """Number the patches that have matches; return that of each match (m,).
+
+    Args:
+        pixel: Positions (m, 2) of the matches, in pixels of an image of ``size``.
+        size: Width and height of the image, pixels.
+    """
+    patch_px = max(size) / PATCHES_ACROSS
+    place = np.floor(pixel / patch_px).astype(np.int64)
+    _, patch = np.unique(place, axis=0, return_inverse=True)
+    return np.asarray(patch, np.int64).ravel()
+
+
 def support_of(
     pixel: NDArray[np.float64],
     own: NDArray[np.int64],
@@ -101,9 +114,8 @@ def support_of(
     """
     if not inlier.any():
         return NO_SUPPORT
-    patch_px = max(size) / PATCHES_ACROSS
-    place = np.floor(pixel / patch_px).astype(np.int64)
-    _, patch, matches = np.unique(place, axis=0, return_inverse=True, return_counts=True)
+    patch = patches_of(pixel, size)
+    matches = np.bincount(patch)
     single = min(1.0, math.pi * max_error_px**2 / (size[0] * size[1]))
     chance = float(np.mean(1.0 - (1.0 - single) ** matches))
     return Support(

@@ -24,6 +24,7 @@ from baselines.references.map_localizer import (
 )
 from baselines.references.mapped import StructureMap, read_map
 from baselines.references.redrawn import read_redrawn
+from baselines.references.stated_errors import read_scale
 from baselines.training.localize import open_picture
 from baselines.training.pictures import check_out, find_pictures, refuse_mixed_sizes
 from synfeal.camera.photograph import PhotographCamera
@@ -53,6 +54,7 @@ class LocalizedInMap(NamedTuple):
         seconds: Median time for one photograph, all included.
         n_frames: Frames of the map.
         n_points: Features of the map.
+        states_errors: True where the map was tried, so that poses state their errors.
     """
 
     n_images: int
@@ -65,6 +67,7 @@ class LocalizedInMap(NamedTuple):
     seconds: float
     n_frames: int
     n_points: int
+    states_errors: bool
 
 
 def localize_in_map(
@@ -98,6 +101,7 @@ def localize_in_map(
     """
     check_confidence(least_confidence)
     place = read_map(folder)
+    scale = read_scale(folder)
     pictures = find_pictures(named)
     check_out(out, pictures)
     refuse_mixed_sizes(camera, pictures)
@@ -108,7 +112,12 @@ def localize_in_map(
         if refine is not None:
             refiner = opened.enter_context(read_redrawn(place, refine, folder, seed)).refine
         localizer = MapLocalizer(
-            place, world=world, least_confidence=least_confidence, refine=refiner, seed=seed
+            place,
+            world=world,
+            least_confidence=least_confidence,
+            refine=refiner,
+            scale=scale,
+            seed=seed,
         )
 
         def locate(path: Path) -> Located:
@@ -131,6 +140,7 @@ def localize_in_map(
         seconds=median(taken_s),
         n_frames=len(place),
         n_points=len(place.features.slope),
+        states_errors=scale is not None,
     )
 
 

@@ -12,10 +12,11 @@ from PIL import Image
 from baselines.references.confidence import LEAST_CONFIDENCE
 from baselines.references.mapped import StructureMap
 from baselines.references.photographs import Answer, Finder, Photograph
+from baselines.references.stated_errors import ErrorScale, Stated
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.orientation import Orientation
 from synfeal.camera.photograph import PhotographCamera
-from synfeal.dataset.pose_table import COLUMNS, IMAGE, SUPPORT
+from synfeal.dataset.pose_table import COLUMNS, IMAGE, STATED, SUPPORT
 from synfeal.errors import InputError
 from synfeal.geometry.poses import quat_wxyz_of
 
@@ -24,7 +25,7 @@ World = Literal["sequence", "mesh"]
 Status = Literal["localized", "not localized", "ambiguous"]
 Refine = Callable[[Photograph, Answer], Answer]
 
-HEADER = (IMAGE, *COLUMNS[2:], *SUPPORT)
+HEADER = (IMAGE, *COLUMNS[2:], *SUPPORT, *STATED)
 FOUND: Status = "localized"
 NOT_FOUND: Status = "not localized"
 AMBIGUOUS: Status = "ambiguous"
@@ -40,6 +41,7 @@ class Located(NamedTuple):
         answer: What the map says, its pose in the world of the map.
         calibration: Camera of the upright photograph.
         is_turned: True where its EXIF turns it, and its calibration with it.
+        stated: Radii that hold its error; None unless it was localized in a map that was tried.
     """
 
     status: Status
@@ -47,6 +49,7 @@ class Located(NamedTuple):
     answer: Answer
     calibration: Calibration
     is_turned: bool
+    stated: Stated | None = None
 
     @property
     def row(self) -> dict[str, float | int | str]:
@@ -57,11 +60,13 @@ class Located(NamedTuple):
             values[3:] = quat_wxyz_of(self.world_from_cam)
         pose = dict(zip(COLUMNS[2:], values.round(DECIMALS).tolist(), strict=True))
         status, inliers, confidence = SUPPORT
+        radii = [np.nan] * len(STATED) if self.stated is None else self.stated
         return {
             **pose,
             status: self.status,
             inliers: self.answer.support.inliers,
             confidence: round(self.answer.support.confidence, DECIMALS),
+            **{name: round(radius, DECIMALS) for name, radius in zip(STATED, radii, strict=True)},
         }
 
 
@@ -74,6 +79,7 @@ class MapLocalizer:
             that has its own.
         least_confidence: Poses with less are not given.
         refine: Improves the pose of a photograph that was localized; None leaves it as it is.
+        scale: Scale of the errors that poses state; None where the map was not tried.
         seed: Seed of RANSAC's samples, the same for every photograph.
 
     Attributes:
@@ -87,11 +93,13 @@ class MapLocalizer:
         world: World = "sequence",
         least_confidence: float = LEAST_CONFIDENCE,
         refine: Refine | None = None,
+        scale: ErrorScale | None = None,
         seed: int = 0,
     ) -> None:
         self._finder = Finder(place, seed)
         self._least_confidence = least_confidence
         self._refine = refine
+        self._scale = scale
         self.world: World | None = None if place.sequence_from_world is None else world
         self._out_from_map = place.sequence_from_world if self.world == "sequence" else None
 
@@ -129,7 +137,14 @@ class MapLocalizer:
             answer=answer,
             calibration=calibration,
             is_turned=camera.turns_with(image, turn),
+            stated=self._stated(answer) if status == FOUND else None,
         )
+
+    def _stated(self, answer: Answer) -> Stated | None:
+        """State the error of a pose; None where nothing bounds it."""
+        if self._scale is None or answer.spread is None or not np.isfinite(answer.spread).all():
+            return None
+        return self._scale.stated(answer.spread)
 
     def _status_of(self, answer: Answer) -> Status:
         if answer.support.confidence < self._least_confidence:

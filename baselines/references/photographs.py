@@ -17,10 +17,17 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from baselines.references.arrays import most_alike
-from baselines.references.confidence import LEAST_CONFIDENCE, NO_SUPPORT, Support, support_of
+from baselines.references.confidence import (
+    LEAST_CONFIDENCE,
+    NO_SUPPORT,
+    Support,
+    patches_of,
+    support_of,
+)
 from baselines.references.correspondences import mutual_matches
 from baselines.references.features import roots_of
 from baselines.references.mapped import VIEW_PX, StructureMap, detect, detector
+from baselines.references.pose_covariance import Spread, pose_covariance, spread_of
 from baselines.references.structure import pinhole, refined_focal_px, refined_pose, supported_pose
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.distortion import distort, undistort
@@ -78,12 +85,14 @@ class Answer(NamedTuple):
             no pose was found. Of one photograph it means little, for a step back looks much like
             a shorter lens; of many the median does.
         rival: The best pose elsewhere, where there is any: places repeat themselves.
+        spread: What its inliers say of its error, not calibrated; None where no pose was found.
     """
 
     world_from_cam: Array
     support: Support
     focal_ratio: float
     rival: Rival | None = None
+    spread: Spread | None = None
 
     @property
     def is_ambiguous(self) -> bool:
@@ -154,10 +163,18 @@ class Finder:
             shown=np.asarray(((places > 0) & (places < full)).all(axis=-1)),
         )
 
-    def find(self, photograph: Photograph) -> Answer:
-        """Estimate where a photograph was taken."""
+    def find(self, photograph: Photograph, among: Rows | None = None) -> Answer:
+        """Estimate where a photograph was taken.
+
+        Args:
+            photograph: The photograph.
+            among: Frames of the map to use; None for all.
+        """
+        if among is None:
+            among = np.arange(len(self._place))
         matched = _Matched(photograph, self._place, self._focal_px)
-        places = [self._settled(matched, attempt) for attempt in self._candidates(matched)]
+        candidates = self._candidates(matched, among)
+        places = [self._settled(matched, attempt, among) for attempt in candidates]
         if not places:
             return NOT_FOUND
         best = max(places, key=lambda attempt: attempt.support.inliers)
@@ -171,6 +188,7 @@ class Finder:
             support=best.support,
             focal_ratio=self._focal_ratio(best),
             rival=max(rivals, key=lambda rival: rival.inliers, default=None),
+            spread=self._spread(best),
         )
 
     def _elsewhere(self, attempt: _Attempt, best: _Attempt) -> int:
@@ -189,14 +207,14 @@ class Finder:
         )
         return len(np.unique(own[is_elsewhere]))
 
-    def _candidates(self, matched: _Matched) -> list[_Attempt]:
+    def _candidates(self, matched: _Matched, among: Rows) -> list[_Attempt]:
         """List poses at different places, those with most support first.
 
         All matches together agree on one pose. Of a place that repeats itself they hold many, each
         with a small share of the matches, which RANSAC misses; the matches with one frame are of
         few repeats, mostly of one.
         """
-        frames = self.alike(matched.photograph)
+        frames = self.alike(matched.photograph, among)
         matches = matched.with_frames(frames)
         first = self._agreed(matches)
         by_frame = [self._agreed(matched.with_frames([frame])) for frame in frames]
@@ -210,29 +228,33 @@ class Finder:
                 found.append(other)
         return found[:MOST_PLACES]
 
-    def _settled(self, matched: _Matched, attempt: _Attempt) -> _Attempt:
+    def _settled(self, matched: _Matched, attempt: _Attempt, among: Rows) -> _Attempt:
         """Match the frames that were taken nearest to a pose too, and keep the better one."""
-        matches = matched.with_frames(self.nearest(attempt.world_from_cam))
+        matches = matched.with_frames(self.nearest(attempt.world_from_cam, among))
         second = self._agreed(matches)
         if second is None or _are_apart(second.world_from_cam, attempt.world_from_cam):
             second = self._refined(matches, attempt.world_from_cam)
         better = second.support.log10_nfa < attempt.support.log10_nfa
         return second if better else attempt
 
-    def alike(self, photograph: Photograph) -> Rows:
-        """List the frames of the map that look most alike, best first."""
+    def alike(self, photograph: Photograph, among: Rows) -> Rows:
+        """List the frames, of some of the map, that look most alike, best first."""
         vector = self._place.vlad.describe(photograph.view[None])
-        return most_alike(self._place.vectors, vector, FIRST_RETRIEVED).ravel()
+        vectors = self._place.vectors
+        if len(among) < len(vectors):
+            vectors = vectors[among]
+        return among[most_alike(vectors, vector, FIRST_RETRIEVED).ravel()]
 
-    def nearest(self, world_from_cam: Array) -> Rows:
-        """List the frames of the map that were taken nearest to a pose (4, 4), best first."""
-        place_m, quat_wxyz = self._place.world_from_cam[:, :3, 3], self._place.quat_wxyz
+    def nearest(self, world_from_cam: Array, among: Rows) -> Rows:
+        """List the frames, of some of the map, that were taken nearest to a pose (4, 4)."""
+        place_m = self._place.world_from_cam[among, :3, 3]
+        quat_wxyz = self._place.quat_wxyz[among]
         distance_m = np.linalg.norm(place_m - world_from_cam[:3, 3], axis=1)
         cosine = np.abs(quat_wxyz @ quat_wxyz_from_matrix(world_from_cam[:3, :3]))
         angle_rad = 2 * np.arccos(np.minimum(cosine, 1))
         far = distance_m + METRES_PER_RADIAN * angle_rad
         order: Rows = np.argsort(far, kind="stable")
-        return order[:RETRIEVED]
+        return among[order[:RETRIEVED]]
 
     def _agreed(self, matches: _Matches) -> _Attempt | None:
         """Estimate the pose that most matches agree with."""
@@ -288,6 +310,19 @@ class Finder:
             seen = in_cam_m[:, :2] / in_cam_m[:, 2:] * self._focal_px
             missed_px = np.linalg.norm(seen - matches.pixel, axis=1)
         return np.where(in_cam_m[:, 2] > 0, missed_px, np.inf)
+
+    def _spread(self, attempt: _Attempt) -> Spread:
+        """Say how exact a pose is by the matches that agree with it."""
+        camera, (_, pixel, point_m), good = self._place.camera, attempt.matches, attempt.inlier
+        return spread_of(
+            pose_covariance(
+                pixel=pixel[good],
+                point_m=point_m[good],
+                world_from_cam=attempt.world_from_cam,
+                focal_px=self._focal_px,
+                cluster=patches_of(pixel[good], (camera.width, camera.height)),
+            )
+        )
 
     def _focal_ratio(self, attempt: _Attempt) -> float:
         """Estimate the best focal length over the given one, from matches that nearly agree."""

@@ -51,7 +51,9 @@ def test_coverage_of_normal_errors(stretched):
 def test_the_needed_radius_holds_just_what_it_says():
     """Of 20 equal radii, the 19th largest error is the one that 95 % need."""
     error = np.arange(1.0, 21.0)
-    (found,) = [one for one in coverage(error, np.full(20, 5.0), np.full(20, 38.0)) if one[0] == 0.95]
+    (found,) = [
+        one for one in coverage(error, np.full(20, 5.0), np.full(20, 38.0)) if one[0] == 0.95
+    ]
     assert found.held == 1.0
     assert found.width == pytest.approx(38.0 / 19.0)
 

@@ -1,0 +1,286 @@
+"""Errors that poses state: what their inliers say, scaled by a trial of the map.
+
+The covariance of a pose (:mod:`baselines.references.pose_covariance`) says which poses are more
+exact than others, and nearly how exact. What it does not know, such as how far wrong the points of
+the map are, and how often a pose is off by more than its inliers let see, is measured: frames of
+the map are shown to it under another light, lens and sensor, as photographs of a place that has not
+their frames, and the error of each pose is divided by its spread. Of these ratios the quantiles of
+68 and of 95 % are the factors between spreads and stated radii. They are taken one rank higher than
+in the sample itself, so that a new pose of the same kind lies within the radius with that
+probability at least, whatever the distribution (split conformal prediction: Papadopoulos et al.,
+ECML 2002; Lei et al., JASA 2018).
+
+The trial knows the errors of matching in the map, not those of the capture that it was built from.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from PIL import Image
+from pydantic import ValidationError, model_validator
+
+from baselines.references.confidence import LEAST_CONFIDENCE
+from baselines.references.map_frames import MapFrames
+from baselines.references.mapped import RECORD, StructureMap
+from baselines.references.photographs import Finder
+from baselines.references.pose_covariance import Spread
+from baselines.training.photometric import PhotometricRandomisation
+from synfeal.camera.calibration import Calibration
+from synfeal.config.dataset import CameraConfig
+from synfeal.config.effects import NoiseConfig
+from synfeal.config.load import describe
+from synfeal.config.photometric import BlurConfig, PhotometricConfig
+from synfeal.config.types import NonNegative, Positive, Strict
+from synfeal.errors import InputError, read_as
+from synfeal.evaluation.coverage import SD_LEVEL, WIDE_LEVEL, Coverage, coverage
+from synfeal.evaluation.metrics import ORIENTATION, POSITION
+from synfeal.geometry.poses import pose_error
+from synfeal.records.files import file_sha256, read_json, write_json
+from synfeal.records.progress import Progress
+
+Array = NDArray[np.float64]
+
+FILE = "trial.json"
+FORMAT, VERSION = "synfeal trial of a map", 1
+TRIED = 100  # frames of the map
+# Frames before and after one that is tried, as a share of all: those of one path or of one stretch
+# of a sequence were taken side by side, and are left out with it.
+LEFT_OUT = 0.02
+# Poses found; of fewer, the 95 % quantile is their largest.
+FEWEST = 24
+# Ranges of a photograph as large as the map's frames; those of training are for images of 64
+# pixels.
+PHOTOGRAPHIC = PhotometricConfig(
+    blur=BlurConfig(sigma=0.005), noise=NoiseConfig(full_well_e=5000.0, read_e=5.0)
+)
+
+
+class Stated(NamedTuple):
+    """Radii that a pose states, in the order of the columns ``STATED``.
+
+    Attributes:
+        position_sd_m: Holds the error of the position with 68 %.
+        position_95_m: Holds it with 95 %.
+        orientation_sd_deg: Holds the error of the orientation with 68 %.
+        orientation_95_deg: Holds it with 95 %.
+    """
+
+    position_sd_m: float
+    position_95_m: float
+    orientation_sd_deg: float
+    orientation_95_deg: float
+
+
+class Trial(Strict):
+    """Content of ``trial.json``: frames that were shown to a map, and the poses that it found.
+
+    Attributes:
+        format: ``FORMAT``.
+        version: ``VERSION``.
+        map_sha256: Hash of the ``map.json`` that was tried.
+        seed: Of light, lens and sensor.
+        tried: Frames shown, localized or not.
+        position_m: Error of each pose found.
+        position_spread_m: What its inliers say of that error.
+        orientation_deg: Error of each pose found.
+        orientation_spread_deg: What its inliers say of that error.
+    """
+
+    format: Literal["synfeal trial of a map"] = FORMAT
+    version: Literal[1] = VERSION
+    map_sha256: str
+    seed: int
+    tried: int
+    position_m: tuple[NonNegative, ...]
+    position_spread_m: tuple[Positive, ...]
+    orientation_deg: tuple[NonNegative, ...]
+    orientation_spread_deg: tuple[Positive, ...]
+
+    @model_validator(mode="after")
+    def _one_row_each(self) -> Trial:
+        columns = (
+            self.position_m,
+            self.position_spread_m,
+            self.orientation_deg,
+            self.orientation_spread_deg,
+        )
+        if len({len(column) for column in columns}) > 1:
+            raise ValueError("its columns are not of one length")
+        return self
+
+
+class ErrorScale:
+    """Turns spreads into stated radii.
+
+    Args:
+        trial: Trial of the map, of at least ``FEWEST`` poses.
+    """
+
+    def __init__(self, trial: Trial) -> None:
+        self._position = _factors(trial.position_m, trial.position_spread_m)
+        self._orientation = _factors(trial.orientation_deg, trial.orientation_spread_deg)
+
+    def stated(self, spread: Spread) -> Stated:
+        """Return the radii of a pose of this spread."""
+        position = [spread.position_m * factor for factor in self._position]
+        orientation = [spread.orientation_deg * factor for factor in self._orientation]
+        return Stated(*position, *orientation)
+
+
+def _factors(errors: tuple[float, ...], spreads: tuple[float, ...]) -> list[float]:
+    """Compute the ratios of error to spread that hold 68 and 95 % of new poses."""
+    ratios = np.sort(np.array(errors) / np.array(spreads))
+    ranks = (math.ceil((len(ratios) + 1) * level) for level in (SD_LEVEL, WIDE_LEVEL))
+    return [float(ratios[min(rank, len(ratios)) - 1]) for rank in ranks]
+
+
+def held_out_coverage(trial: Trial) -> dict[str, list[Coverage]]:
+    """Judge the stated errors of each half of a trial by the factors of the other half.
+
+    Returns:
+        Coverage of ``position_m`` and of ``orientation_deg``; nothing where a half has too few.
+    """
+    if len(trial.position_m) < 2 * FEWEST:
+        return {}
+    columns = {
+        POSITION: (trial.position_m, trial.position_spread_m),
+        ORIENTATION: (trial.orientation_deg, trial.orientation_spread_deg),
+    }
+    found = {}
+    for name, (errors, spreads) in columns.items():
+        factors = np.empty((len(errors), 2))
+        for half in (0, 1):
+            factors[half::2] = _factors(errors[1 - half :: 2], spreads[1 - half :: 2])
+        stated = np.array(spreads)[:, None] * factors
+        found[name] = coverage(np.array(errors), *stated.T)
+    return found
+
+
+def read_scale(folder: Path) -> ErrorScale | None:
+    """Read the scale of a map's errors.
+
+    Args:
+        folder: The map.
+
+    Returns:
+        The scale; None where the map was not tried (earlier versions did not), was changed since,
+        or found too few of the frames that it was shown.
+
+    Raises:
+        InputError: The file is damaged.
+    """
+    if not (folder / FILE).is_file():
+        return None
+    trial = read_trial(folder)
+    changed = trial.map_sha256 != file_sha256(folder / RECORD)
+    return None if changed or len(trial.position_m) < FEWEST else ErrorScale(trial)
+
+
+def read_trial(folder: Path) -> Trial:
+    """Read the trial of a map.
+
+    Args:
+        folder: The map.
+
+    Raises:
+        InputError: The file is damaged.
+    """
+    path = folder / FILE
+    remedy = "delete it, and make it again by synfeal build or synfeal map"
+    with read_as(path, "the trial of a map", remedy=f"; {remedy}"):
+        values = read_json(path)
+    try:
+        return Trial.model_validate(values)
+    except ValidationError as error:
+        raise InputError(path, describe(error), remedy) from error
+
+
+def write_trial(place: StructureMap, frames: MapFrames, folder: Path, seed: int = 0) -> Trial:
+    """Try a map on its own frames, and write ``trial.json`` into its folder.
+
+    Args:
+        place: The map.
+        frames: Its frames.
+        folder: Where it lies.
+        seed: Of light, lens and sensor, and of RANSAC's samples.
+    """
+    trial = try_map(place, frames, file_sha256(folder / RECORD), seed)
+    write_json(folder / FILE, trial.model_dump(mode="json"))
+    return trial
+
+
+def try_map(place: StructureMap, frames: MapFrames, map_sha256: str, seed: int) -> Trial:
+    """Show frames of a map to the rest of it, under another light, lens and sensor.
+
+    Args:
+        place: The map.
+        frames: Its frames.
+        map_sha256: Hash that the map is known by.
+        seed: Of light, lens and sensor, and of RANSAC's samples.
+    """
+    torch.set_num_threads(1)
+    finder = Finder(place, seed)
+    randomise = PhotometricRandomisation(PHOTOGRAPHIC, seed)
+    calibration = _calibration_of(place.camera)
+    every = np.arange(len(place))
+    found: list[tuple[float, ...]] = []
+    tried = np.unique(np.linspace(0, len(place) - 1, TRIED).round().astype(np.int64))
+    if len(tried) < FEWEST:  # too few poses would be found, whatever they were
+        tried = tried[:0]
+    with Progress(len(tried), "tried") as progress:
+        for row in tried:
+            image = photographed(frames.read_color(int(row)), randomise)
+            photograph = finder.look_at(Image.fromarray(image), calibration)
+            among = every[np.abs(every - row) > LEFT_OUT * len(place)]
+            answer = finder.find(photograph, among)
+            sure = answer.support.confidence >= LEAST_CONFIDENCE and not answer.is_ambiguous
+            spread = answer.spread
+            if sure and spread is not None and math.isfinite(sum(spread)):
+                error_m, error_rad = pose_error(answer.world_from_cam, place.world_from_cam[row])
+                error_deg = float(np.degrees(error_rad))
+                found.append((float(error_m), spread.position_m, error_deg, spread.orientation_deg))
+            progress.update()
+    columns = np.array(found, np.float64).reshape(-1, 4).T.tolist()
+    return Trial(
+        map_sha256=map_sha256,
+        seed=seed,
+        tried=len(tried),
+        position_m=columns[0],
+        position_spread_m=columns[1],
+        orientation_deg=columns[2],
+        orientation_spread_deg=columns[3],
+    )
+
+
+def photographed(
+    image: NDArray[np.uint8], randomise: PhotometricRandomisation
+) -> NDArray[np.uint8]:
+    """Show an image (H, W, 3) under another light, lens and sensor.
+
+    What is randomised are squares, so the shorter side is continued as in a mirror.
+    """
+    height, width = image.shape[:2]
+    side = max(height, width)
+    square = np.pad(image, ((0, side - height), (0, side - width), (0, 0)), mode="symmetric")
+    shown = randomise(torch.from_numpy(square).permute(2, 0, 1)[None])[0]
+    levels = shown[:, :height, :width].permute(1, 2, 0).round().to(torch.uint8)
+    return np.ascontiguousarray(levels.numpy())
+
+
+def _calibration_of(camera: CameraConfig) -> Calibration:
+    fx, fy, cx, cy = camera.intrinsics
+    return Calibration(
+        width=camera.width,
+        height=camera.height,
+        fx=fx,
+        fy=fy,
+        cx=cx,
+        cy=cy,
+        distortion=camera.distortion,
+    )
