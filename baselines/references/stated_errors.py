@@ -47,7 +47,6 @@ from synfeal.records.progress import Progress
 Array = NDArray[np.float64]
 
 FILE = "trial.json"
-FORMAT, VERSION = "synfeal trial of a map", 1
 TRIED = 100  # frames of the map
 # Frames before and after one that is tried, as a share of all: those of one path or of one stretch
 # of a sequence were taken side by side, and are left out with it.
@@ -81,8 +80,8 @@ class Trial(Strict):
     """Content of ``trial.json``: frames that were shown to a map, and the poses that it found.
 
     Attributes:
-        format: ``FORMAT``.
-        version: ``VERSION``.
+        format: Kind of the file.
+        version: Of its layout.
         map_sha256: Hash of the ``map.json`` that was tried.
         seed: Of light, lens and sensor.
         tried: Frames shown, localized or not.
@@ -92,8 +91,8 @@ class Trial(Strict):
         orientation_spread_deg: What its inliers say of that error.
     """
 
-    format: Literal["synfeal trial of a map"] = FORMAT
-    version: Literal[1] = VERSION
+    format: Literal["synfeal trial of a map"] = "synfeal trial of a map"
+    version: Literal[1] = 1
     map_sha256: str
     seed: int
     tried: int

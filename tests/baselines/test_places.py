@@ -29,7 +29,7 @@ from tests.support.small_room import SIZE_M, furnished_room
 
 pytest.importorskip("open3d")
 BUILD = ("--frames", "50", "--width", "240")
-N_STAGES = 5
+N_STAGES = 6
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +101,20 @@ def test_the_report_says_what_was_measured(place):
     assert "data:image/jpeg;base64" in page
     assert "sensed by the device" in page
     assert "40 of 80 frames have no photograph" in page
+
+
+def test_the_report_plots_stated_errors(place):
+    """Of photographs of known pose, and of the frames that the map was tried on, if enough."""
+    record = json.loads((place / "place.json").read_text())
+    levels = {one["level"]: one["held"] for one in record["check"]["stated"]["position_m"]}
+    table = pd.read_csv(place / "check.csv")
+    assert table.loc[table["status"] == "localized", "position_95_m"].gt(0).all()
+    assert 0.8 <= levels[0.95] <= levels[0.99] <= 1.0
+    assert record["trial"]["localized"] <= record["trial"]["pictures"] == 50
+    page = (place / "report.html").read_text()
+    plotted = [of for of in ("trial", "check") if record[of]["stated"]]
+    assert page.count("<polyline") == 2 * len(plotted)
+    assert page.count('<polyline class="check') == 2
 
 
 def test_built_again_nothing_is_made_anew(place, capture, capsys):
