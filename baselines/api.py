@@ -241,7 +241,7 @@ def localize(
 
     Args:
         model: Folder of ``build`` or of ``map``, or ``model.pt`` of ``train`` or of the benchmark.
-        images: PNG or JPEG of any size, or directories of them.
+        images: PNG, JPEG or HEIC of any size, or directories of them.
         out: CSV file to write.
         camera: Calibration of the photographs.
         focal_px: Focal length of the photographs in their pixels, in place of a calibration.

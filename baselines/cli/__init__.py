@@ -23,7 +23,7 @@ DEVICES = ("auto", "cpu", "cuda")
     ),
     option(
         "images",
-        "PNG or JPEG of any size, or a directory of them; a map needs their focal length, and"
+        "PNG, JPEG or HEIC of any size, or a directory; a map needs their focal length, and"
         " without it a model assumes the field of view of its training frames, which is printed",
         type=Path,
         nargs="+",

@@ -325,7 +325,10 @@ class Finder:
         )
 
     def _focal_ratio(self, attempt: _Attempt) -> float:
-        """Estimate the best focal length over the given one, from matches that nearly agree."""
+        """Estimate the best focal length over the given one, from matches that nearly agree.
+
+        NaN where it is not found.
+        """
         matches = attempt.matches
         near = self._missed_px(matches, attempt.world_from_cam) < FOCAL_ERRORS * MAX_ERROR_PX
         focal_px = refined_focal_px(

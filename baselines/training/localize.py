@@ -285,7 +285,6 @@ def _write(
 
 
 FORMATS = ("PNG", "JPEG", HEIF)
-# Modes of eight bits or fewer per channel; what else there is has no scale that is known.
 LEAVE_OUT = "; leave it out or repair it"
 # A longer picture has no square with as much to see as a training frame has.
 MAX_ASPECT = 20
@@ -295,7 +294,7 @@ def read_picture(path: Path, input_px: int, view: NetworkView = "square") -> NDA
     """Read a picture that shows what training frames do.
 
     Args:
-        path: PNG or JPEG.
+        path: PNG, JPEG or HEIC.
         input_px: Side of the network's image.
         view: Part of the picture that it shows.
 
@@ -311,11 +310,12 @@ def read_picture(path: Path, input_px: int, view: NetworkView = "square") -> NDA
 def open_picture(path: Path) -> Upright:
     """Read a picture as RGB, turned upright by its EXIF orientation.
 
-    Rendered frames have none, so the packer does not look. Grey, palette and CMYK become RGB; an
-    alpha channel is left out.
+    So are photographs that are packed for training. Grey, palette and CMYK become RGB; an alpha
+    channel is left out.
 
     Raises:
-        InputError: The file is damaged, or is no picture of eight bits per channel.
+        InputError: The file is damaged, is no picture of eight bits per channel, or is too long for
+            a square to be cut out.
     """
     image = read_image(path, "RGB", formats=FORMATS, most_pixels=MOST_PIXELS, remedy=LEAVE_OUT)
     if max(image.size) > MAX_ASPECT * min(image.size):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import logging
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,7 +22,7 @@ from synfeal.mesh.load import load_mesh
 from synfeal.mesh.model import TexturedMesh
 from synfeal.mesh.triangles import with_fewer_faces, with_smaller_textures
 from synfeal.records.files import read_json
-from synfeal.records.tables import COUNT, NUMBER, TEXT, frame_of, write_frame
+from synfeal.records.tables import COUNT, LIMITLESS, NUMBER, TEXT, frame_of, write_frame
 from synfeal.records.timing import seconds_of
 from synfeal.render import choose, open_renderer
 from synfeal.render.base import SAMPLES_PER_AXIS, Depth, Renderer, Rgb, reference_images
@@ -45,7 +46,7 @@ SCHEMA = {
     "faces": COUNT,
     "ms_per_frame": NUMBER,
     "mean_abs_error": NUMBER,
-    "psnr_db": NUMBER,
+    "psnr_db": LIMITLESS,
     "depth_error_mm": NUMBER,
     "depth_off_share": NUMBER,
     "chosen": COUNT,
@@ -266,7 +267,9 @@ def truth_of(full: Variant, camera: CameraConfig, poses: Poses) -> Truth:
 
 
 def errors_of(renderer: Renderer, poses: Poses, truth: Truth) -> dict[str, float]:
-    """Measure how far a renderer's views are from the truth; afterwards each was drawn once.
+    """Measure how far a renderer's views are from the truth.
+
+    Each view is drawn, so that what a first drawing takes longer is not timed afterwards.
 
     Args:
         renderer: Renderer to judge.
@@ -282,12 +285,16 @@ def errors_of(renderer: Renderer, poses: Poses, truth: Truth) -> dict[str, float
 
 
 def color_errors(rgb: Rgb, expected: NDArray[np.float32]) -> dict[str, float]:
-    """Compute the mean absolute difference in levels of 0 to 255, and the PSNR in dB."""
+    """Compute the mean absolute difference in levels of 0 to 255, and the PSNR in dB.
+
+    The latter is infinite where there is no difference.
+    """
     difference = rgb - expected
     mean_square = float(np.mean(difference**2, dtype=np.float64))
+    psnr_db = 10.0 * math.log10(255.0**2 / mean_square) if mean_square else math.inf
     return {
         "mean_abs_error": round(float(np.abs(difference).mean(dtype=np.float64)), 5),
-        "psnr_db": round(10.0 * float(np.log10(255.0**2 / mean_square)), 4),
+        "psnr_db": round(psnr_db, 4),
     }
 
 

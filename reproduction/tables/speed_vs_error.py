@@ -21,6 +21,7 @@ from synfeal.config.effects import CLEAN
 from synfeal.errors import InputError
 from synfeal.records.tables import (
     COUNT,
+    LIMITLESS_MAYBE,
     MAYBE,
     MAYBE_COUNT,
     NUMBER,
@@ -102,7 +103,7 @@ SCHEMA = {
     "height": MAYBE_COUNT,
     "supersampling": MAYBE_COUNT,
     "texture_scale": MAYBE,
-    "psnr_db": MAYBE,
+    "psnr_db": LIMITLESS_MAYBE,
     "depth_error_mm": MAYBE,
     "depth_off_share": MAYBE,
 }

@@ -140,7 +140,9 @@ def read_rgb(
 
 
 def image_size(path: FrameFile) -> tuple[int, int]:
-    """Read the width and height of an image, pixels, without decoding it.
+    """Read the width and height of an image as it is stored, pixels, without decoding it.
+
+    EXIF may turn it: see :func:`image_size_and_turn`.
 
     Raises:
         InputError: It is missing or no image.

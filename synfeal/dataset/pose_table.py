@@ -125,8 +125,8 @@ def read_pose_table(path: Path, any_frames: bool = False) -> PoseTable:
 
     Raises:
         InputError: the file is missing, has another header, or holds anything but finite numbers,
-            whole ones for frame and path, unit quaternions, and 0 or 1 for registered; or the
-            frames are not 0, 1, 2, ...
+            whole ones for frame and path, positions that a camera may have, unit quaternions, and
+            0 or 1 for registered; or the frames are not 0, 1, 2, ...
     """
     values = read_numbers(path, HEADER, "pose table", passed_over=IMAGE, optional=REGISTERED)
     frame, straight_path = whole_numbers(values[:, :2], path).T

@@ -201,7 +201,7 @@ PAPER: Color = (0.93, 0.92, 0.88)
 
 @painter
 def screen(canvas: Canvas) -> Pixels:
-    """Paint a computer screen: windows, a plot, lines of code."""
+    """Paint a computer screen: windows with lines of code."""
     rng = canvas.rng
     sketch = Sketch(ramp(canvas, shade(pick(rng, VIVID), 0.6), (0.1, 0.12, 0.2), rng.uniform(0, 6)))
     for _ in range(3):
@@ -282,7 +282,7 @@ def keyboard(canvas: Canvas) -> Pixels:
 
 @painter
 def page(canvas: Canvas) -> Pixels:
-    """Paint a printed sheet of paper, sometimes with a figure."""
+    """Paint a printed sheet of paper: a heading, a coloured figure, text."""
     sketch = Sketch(canvas.plain(PAPER))
     sketch.text_lines(canvas.rng, (0.1, 0.06, 0.9, 0.14), 1, pick(canvas.rng, INK))
     sketch.text_lines(canvas.rng, (0.1, 0.5, 0.9, 0.94), 9, (0.2, 0.2, 0.2))

@@ -10,6 +10,7 @@ from torch import nn
 
 from baselines.config.learning import INCEPTION_V3_MIN_PX
 from baselines.localizers.backbones import weights
+from baselines.localizers.backbones.googlenet import ConvBn
 from baselines.localizers.backbones.shipped import BACKBONES, ship, shipped_weights_path
 from baselines.localizers.backbones.weights import (
     CLASSIFIERS,
@@ -36,6 +37,17 @@ def test_narrow_backbones_run_at_any_size_from_the_least_on(name, input_px, side
     if name == "inception_v3":
         with pytest.raises(RuntimeError, match=r"too small|greater than"):
             backbone(torch.zeros(1, 3, input_px - 1, input_px - 1))
+
+
+@pytest.mark.parametrize(
+    ("side", "kernel", "stride", "padded", "expected"),
+    [(8, 3, 2, False, 3), (8, 3, 1, False, 6), (9, 3, 2, False, 4), (9, 3, 2, True, 5)],
+)
+def test_convolutions_without_padding_lose_a_margin(side, kernel, stride, padded, expected):
+    layer = ConvBn(1, 2, kernel, stride, padded)
+    assert layer(torch.zeros(2, 1, side, side)).shape == (2, 2, expected, expected)
+    # As the docstring says it: padded S / stride, else (S - kernel + 1) / stride, rounded up.
+    assert expected == -(-(side if padded else side - kernel + 1) // stride)
 
 
 def test_weights_of_another_width_or_hash_are_refused(tmp_path, monkeypatch):

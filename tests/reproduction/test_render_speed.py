@@ -55,6 +55,8 @@ def test_errors_of_colour_and_of_depth_where_both_hit_in_closed_form():
     found = speed.color_errors(rgb, expected)
     assert found["mean_abs_error"] == pytest.approx(2.0)
     assert found["psnr_db"] == pytest.approx(20 * np.log10(255) - 10 * np.log10(8.0), abs=1e-3)
+    same = speed.color_errors(rgb, rgb.astype(np.float32))
+    assert same == {"mean_abs_error": 0.0, "psnr_db": np.inf}
     expected = np.array([[1.0, 1.0, 1.0, 1.0, np.inf, 2.0]], np.float32)
     depth = np.array([[1.001, 0.998, 1.003, 1.05, 1.0, np.inf]], np.float32)
     found = speed.depth_errors(depth, expected)

@@ -42,7 +42,15 @@ class ConvBn(nn.Module):
         self.bn = nn.BatchNorm2d(n_out, eps=0.001)
 
     def forward(self, maps: Tensor) -> Tensor:
-        """Map (B, n_in, H, W) to (B, n_out, H / stride, W / stride); rounded up if padded."""
+        """Convolve, normalise and rectify.
+
+        Args:
+            maps: Maps (B, n_in, H, W).
+
+        Returns:
+            Maps (B, n_out, H', W'). A side S becomes S / stride if padded, rounded up; without, it
+            is S - kernel + 1 that is divided.
+        """
         return torch.relu_(self.normalised(maps))
 
     def normalised(self, maps: Tensor) -> Tensor:

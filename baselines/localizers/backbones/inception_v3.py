@@ -121,7 +121,7 @@ class Mixed(nn.Module):
         return n
 
     def forward(self, maps: Tensor) -> Tensor:
-        """Map (B, n_in, H, W) to (B, n_out, H, W); a reduction's maps have half the side."""
+        """Map (B, n_in, H, W) to (B, n_out, H, W); reductions halve H - 1 and W - 1."""
         return torch.cat([self._branch(branch, maps) for branch in self.branches], dim=1)
 
     def _branch(self, branch: Branch, maps: Tensor) -> Tensor:
