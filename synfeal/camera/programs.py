@@ -18,6 +18,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 Values = Mapping[str, Any]
 
 PERSPECTIVE, FISHEYE = "plumb_bob", "equidistant"
@@ -45,6 +48,8 @@ ORBSLAM_LENS = {
     "kannalabrandt8": FISHEYE,
     "fisheye": FISHEYE,
 }
+# Places along each side of an image that a lens is fitted at, and how far the fit may be off.
+FIT_ACROSS, MOST_OFF_PX = 41, 0.1
 UNDISTORT = "undistort the images first, and give the calibration of those"
 
 
@@ -143,16 +148,74 @@ def _of_realsense(values: Values) -> Values:
         said = REALSENSE_LENS[said]
     name = re.sub(r"^.*?distortion[._ ]", "", str(said).lower()).replace("_", " ")
     coefficients = _floats(values.get("coeffs") or [0.0] * 5, "coeffs")
+    pinhole = [values.get(key) for key in ("fx", "fy", "ppx", "ppy")]
+    width, height = values.get("width"), values.get("height")
     if name == "kannala brandt4":
         lens, coefficients = FISHEYE, coefficients[:4]
     elif name == "brown conrady" or not any(coefficients):
         lens = PERSPECTIVE
+    elif name in ("inverse brown conrady", "modified brown conrady"):
+        lens = PERSPECTIVE
+        coefficients = _fitted(name, coefficients, (width, height), pinhole)
     else:
         raise ValueError(
             f"model: '{name[:40]}' with coefficients that are not 0 is not OpenCV's; {UNDISTORT}"
         )
-    pinhole = [values.get(key) for key in ("fx", "fy", "ppx", "ppy")]
-    return _opencv(values.get("width"), values.get("height"), pinhole, lens, coefficients)
+    return _opencv(width, height, pinhole, lens, coefficients)
+
+
+def _fitted(
+    name: str, coefficients: Sequence[float], size: Sequence[Any], pinhole: Sequence[Any]
+) -> list[float]:
+    """Fit OpenCV's five coefficients to another form of Brown and Conrady's model.
+
+    The inverse form has Brown and Conrady's polynomial from the distorted to the undistorted place;
+    the modified form takes the tangential terms of places that are radially distorted already.
+    OpenCV's is linear in its coefficients.
+    """
+    if len(coefficients) != 5:
+        raise ValueError(f"coeffs: must hold 5 numbers, found {len(coefficients)}")
+    width, height = _floats(size, "width, height")
+    fx, fy, cx, cy = _floats(pinhole, "fx, fy, ppx, ppy")
+    column, row = np.meshgrid(
+        np.linspace(0, width - 1, FIT_ACROSS), np.linspace(0, height - 1, FIT_ACROSS)
+    )
+    given = np.stack([(column.ravel() - cx) / fx, (row.ravel() - cy) / fy])
+    k1, k2, p1, p2, k3 = coefficients
+    square = (given**2).sum(axis=0)
+    radial = given * (1 + square * (k1 + square * (k2 + square * k3)))
+    if name.startswith("inverse"):
+        distorted, straight = given, radial + _tangential(given) @ [p1, p2]
+    else:
+        distorted, straight = radial + _tangential(radial) @ [p1, p2], given
+    square = (straight**2).sum(axis=0)
+    design = np.stack(
+        [
+            straight * square,
+            straight * square**2,
+            *np.moveaxis(_tangential(straight), -1, 0),
+            straight * square**3,
+        ],
+        axis=-1,
+    ).reshape(-1, 5)
+    wanted = (distorted - straight).ravel()
+    found, *_ = np.linalg.lstsq(design, wanted)
+    off_px = np.abs((design @ found - wanted).reshape(2, -1) * [[fx], [fy]]).max()
+    if not off_px <= MOST_OFF_PX:
+        raise ValueError(
+            f"model: '{name}' with these coefficients is {off_px:.2g} pixels from any lens of"
+            f" OpenCV's; {UNDISTORT}"
+        )
+    return [float(number) for number in found]
+
+
+def _tangential(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what p1 and p2 add (2, N, 2) to places (2, N)."""
+    x, y = place
+    square = x**2 + y**2
+    return np.stack([[2 * x * y, square + 2 * x**2], [square + 2 * y**2, 2 * x * y]]).transpose(
+        0, 2, 1
+    )
 
 
 def _of_orbslam(values: Values, prefix: str) -> Values:

@@ -4,6 +4,9 @@ A pixel holds a whole number of units, millimetres unless said otherwise, along 
 (along the ray of fisheyes and panoramas). Ours hold 65535 where nothing is; sensors and other
 programs write 0. Both are no measurement, whoever wrote the file.
 
+Other programs also write 32-bit floating-point numbers (TIFF), which are metres; what is not
+positive or not finite is no measurement.
+
 Millimetres of 16 bits end at 65.5 m. Where a data set is stored in coarser units, each of its files
 says so in a text of PNG (chunk ``tEXt``, keyword ``depth_units_per_m``), which goes before
 everything else that is said of the units.
@@ -21,6 +24,7 @@ from synfeal.errors import InputError, read_as
 
 INVALID = 65535
 MILLIMETRES = 1000.0  # units per metre
+MOST_METRES = 200.0  # median of a depth image; numbers above are of a smaller unit
 
 UNITS_KEY = "depth_units_per_m"
 
@@ -39,32 +43,48 @@ def read_depth_m(
     """Read a depth image in metres.
 
     Args:
-        path: 16-bit grey image, on its own or inside an archive.
-        units_per_m: Units that a metre is stored as, where the file does not say it.
+        path: 16-bit or floating-point grey image, on its own or inside an archive.
+        units_per_m: Units that a metre is stored as, where whole numbers are stored and the file
+            does not say it.
         nothing: Value of pixels without a measurement.
         size: Width and height that it must have, pixels.
         remedy: Advice at the end of messages.
 
     Returns:
-        Depth (H, W), ``nothing`` where 0 or 65535 is stored.
+        Depth (H, W), ``nothing`` where nothing was measured.
 
     Raises:
-        InputError: It is missing, damaged, of another size, or no 16-bit grey image.
+        InputError: It is missing, damaged, of another size, or no grey image of 16 bits or floats.
     """
-    units, own_units_per_m = _read_stored(path, size, remedy)
+    image = read_image(path, size=size, remedy=remedy)
+    if image.mode == "F":
+        return _of_floats(np.asarray(image, dtype=np.float32), path, nothing)
+    units, own_units_per_m = _stored(image, path, remedy)
     depth_m = units.astype(np.float32) / np.float32(own_units_per_m or units_per_m)
     return np.where(is_measured(units), depth_m, np.float32(nothing))
 
 
-def _read_stored(
-    path: FrameFile, size: tuple[int, int] | None, remedy: str
-) -> tuple[DepthUnits, float | None]:
-    """Read a depth image (H, W) as stored, and its units a metre where it says so itself."""
-    image = read_image(path, size=size, remedy=remedy)
+def _of_floats(stored: Depth, path: FrameFile, nothing: float) -> Depth:
+    """Take floating-point numbers (H, W) for metres, unless most are too many for that."""
+    is_depth = np.isfinite(stored) & (stored > 0)
+    median = float(np.median(stored[is_depth])) if is_depth.any() else 0.0
+    if median > MOST_METRES:
+        raise InputError(
+            path,
+            f"its floating-point numbers count as metres, and half of them are above {median:.4g}",
+            "divide them by the units of a metre (1000 for millimetres), or store whole numbers of"
+            " 16 bits",
+        )
+    return np.where(is_depth, stored, np.float32(nothing))
+
+
+def _stored(image: Image.Image, path: FrameFile, remedy: str) -> tuple[DepthUnits, float | None]:
+    """Return a depth image (H, W) as stored, and its units a metre where it says so itself."""
     stored = np.asarray(image)
     if not image.mode.startswith("I") or stored.min() < 0 or stored.max() > INVALID:
         raise InputError(
-            path, f"must be a 16-bit grey image of depth, not of mode {image.mode}{remedy}"
+            path,
+            f"must be a 16-bit grey image of depth, not of mode {image.mode}{remedy}",
         )
     return stored.astype(np.uint16, copy=False), _units_in(image, path)
 

@@ -214,6 +214,36 @@ def test_a_calibration_projects_as_opencv_does(name, tmp_path):
     np.testing.assert_allclose(found, expected[:, 0] + 0.5, atol=1e-9)
 
 
+def brown_conrady(place, k1, k2, p1, p2, k3):
+    """The polynomial that librealsense evaluates, of places (N, 2)."""
+    x, y = place.T
+    square = x**2 + y**2
+    radial = 1 + k1 * square + k2 * square**2 + k3 * square**3
+    across = 2 * p1 * x * y + p2 * (square + 2 * x**2)
+    down = 2 * p2 * x * y + p1 * (square + 2 * y**2)
+    return place * radial[:, None], np.column_stack([across, down])
+
+
+@pytest.mark.parametrize("model", ["inverse_brown_conrady", "modified_brown_conrady"])
+def test_the_other_models_of_realsense_are_fitted_to_a_tenth_of_a_pixel(model, tmp_path):
+    """Of a D455's size: the inverse one goes from the image to the ray."""
+    coefficients = (-0.0554, 0.0655, -0.0006, 0.0009, -0.0209)
+    (tmp_path / "d455.json").write_text(realsense(model, coefficients))
+    camera = CameraConfig(calibration=tmp_path / "d455.json")
+    rng = np.random.default_rng(3)
+    pixel = rng.uniform([0, 0], [WIDTH - 1, HEIGHT - 1], (300, 2))
+    place = (pixel - [CX, CY]) / [FX, FY]
+    radial, tangential = brown_conrady(place, *coefficients)
+    if model.startswith("inverse"):
+        ray, shown = radial + tangential, pixel
+    else:
+        _, tangential = brown_conrady(radial, *coefficients)
+        ray, shown = place, (radial + tangential) * [FX, FY] + [CX, CY]
+    found = pixels_of_points(camera, np.column_stack([ray, np.ones(len(ray))]))
+    assert np.abs(found - 0.5 - shown).max() < 0.1
+    assert np.abs(pixel - (ray * [FX, FY] + [CX, CY])).max() > (2.0 if "inverse" in model else -1)
+
+
 @pytest.mark.parametrize("name", FISHEYES)
 def test_a_fisheye_projects_as_opencv_does(name, tmp_path):
     (tmp_path / name).write_text(FISHEYES[name])
@@ -238,7 +268,13 @@ SECOND = KALIBR.replace("cam0", "cam1").replace(str(FX), "460.0")
         ("a.yaml", ROS2.replace("x_offset: 0", "x_offset: 8"), "roi: the images are a part"),
         ("a.yaml", ROS2.replace("binning_x: 0", "binning_x: 2"), "binning_x: images of merged"),
         ("a.yaml", ROS2.replace(f"- {FX}", "- 0.0", 1), "fx: a focal length is a positive number"),
-        ("a.json", realsense("inverse_brown_conrady", [0.1, 0, 0, 0, 0]), "model: 'inverse brown"),
+        ("a.json", realsense("ftheta", [0.1, 0, 0, 0, 0]), "model: 'ftheta'"),
+        (
+            "a.json",
+            realsense("inverse_brown_conrady", [9.0, 0, 0, 0, 0]),
+            "model: 'inverse brown conrady' with these",
+        ),
+        ("a.json", realsense("inverse_brown_conrady", [0.1, 0, 0]), "coeffs: must hold 5"),
         ("a.yaml", ORBSLAM2.replace("Camera.width", "#"), "Camera.width: missing"),
         ("a.json", json.dumps({**OPEN3D, "width": None}), "image_width: must hold numbers"),
         ("a.json", json.dumps({"parameters": []}), "parameters: hold no camera"),

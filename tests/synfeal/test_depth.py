@@ -46,6 +46,22 @@ def test_depth_is_in_metres_and_neither_0_nor_65535_is_measured(path, units_per_
     assert np.allclose(depth_m.flat[[1, 3, 4]], STORED.flat[[1, 3, 4]] / units_per_m)
 
 
+@pytest.mark.parametrize("name", ["frame-000000.depth.tif", "frame-000000.depth.png"])
+def test_floats_are_metres_whatever_the_name_and_the_units_of_whole_numbers(tmp_path, name):
+    stored = np.array([[0.0, 1.25, 70.5], [np.nan, -1.0, np.inf]], np.float32)
+    Image.fromarray(stored).save(tmp_path / name, format="TIFF")
+    depth_m = read_depth_m(tmp_path / name, units_per_m=5000.0, nothing=0.0)
+    assert depth_m.tolist() == [[0.0, 1.25, 70.5], [0.0, 0.0, 0.0]]
+    assert own_units_per_m(tmp_path / name) is None
+
+
+def test_floats_that_are_no_metres_are_refused(tmp_path):
+    path = tmp_path / "frame-000000.depth.tif"
+    Image.fromarray(np.full((4, 4), 1850.0, np.float32)).save(path)
+    with pytest.raises(InputError, match="count as metres, and half of them are above 1850"):
+        read_depth_m(path)
+
+
 def test_every_millimetre_survives_a_round_trip(tmp_path):
     every = np.arange(65536, dtype=np.uint16).reshape(256, 256)
     (tmp_path / "depth.png").write_bytes(encode_png(every))
