@@ -189,6 +189,15 @@ def _every_row(config: Config) -> tuple[Experiment, ...]:
     return tuple(experiments)
 
 
+def idle_scenes(config: Config) -> list[str]:
+    """List the scenes of which nothing in a profile asks for frames."""
+    asked = {row.scene for row in _every_row(config)}
+    asked.update(config.datasets or (), config.rooms, config.estimation.more_scenes)
+    if config.robustness.effects:
+        asked.add(config.robustness.scene)
+    return [scene for scene in config.scenes if scene not in asked]
+
+
 def design_name(config: Config) -> str:
     """Name the design in error lines: by its file, or by the key that holds its rows."""
     given = config.experiments

@@ -47,7 +47,10 @@ class Column:
         """Format a value of the column as it is printed."""
         if pd.isna(value):
             return missing
-        return self.form.format(self.factor * value) if self.form else str(value)
+        if not self.form:
+            return str(value)
+        # Whole numbers stay whole, as formats such as "{:d}" ask for.
+        return self.form.format(value if self.factor == 1.0 else self.factor * value)
 
 
 @dataclass(frozen=True)

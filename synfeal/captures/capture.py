@@ -65,6 +65,9 @@ class Capture:
         up: Way up (3,) in the world of the capture, from the device's own sense of gravity; None
             where nothing says.
         notes: What was found and is not used, or is missing; sentences for a person.
+
+    Raises:
+        InputError: There are no frames.
     """
 
     path: Path
@@ -73,6 +76,10 @@ class Capture:
     depth_from_color: Array = field(default_factory=lambda: np.eye(4))
     up: tuple[float, float, float] | None = None
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.frames:
+            raise InputError(self.path, f"holds no photographs, read as {self.format}")
 
     def __len__(self) -> int:
         return len(self.frames)

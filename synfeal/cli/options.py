@@ -134,7 +134,7 @@ def _details(name: str, field: FieldInfo) -> dict[str, Any]:
     unit = UNITS.get(name.rpartition("_")[2])
     usual = "FILE" if kind is Path else "N" if kind is int else None
     metavar = shown.values[0] if shown.values else unit or usual
-    details["type"] = kind if kind in (int, float, Path) else Path
+    details["type"] = kind if kind in (int, float, str, Path) else Path
     return details | (
         {"metavar": metavar} if metavar else {"metavar": "FILE"} if details["type"] is Path else {}
     )

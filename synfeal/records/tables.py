@@ -106,7 +106,8 @@ def read_records(
     table = parse_cells(path, text, remedy=remedy, sep=sep)
     absent = [name for name in needed if name not in table.header]
     if absent:
-        raise InputError(path, f"column {', '.join(absent)} missing", remedy)
+        found = f"; its columns are {', '.join(table.header)[:200]}" if table.header else ""
+        raise InputError(path, f"column {', '.join(absent)} missing{found}", remedy)
     table.check_rows()
     rows = zip(table.lines, table.rows, strict=True)
     return [(line, dict(zip(table.header, row, strict=True))) for line, row in rows]

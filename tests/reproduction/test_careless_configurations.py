@@ -71,7 +71,10 @@ TABLE = (
     ("results: README.md", "results: README.md is not a directory; choose another one"),
     ('results: "a\\0b"', "results: must not hold the character NUL"),
     ("profile: ../mini", "profile: must match ^[a-z0-9]"),
-    ("scenes: {attic: {source: mesh, path: absent.glb}}", "scenes.attic.path: absent.glb does not"),
+    (
+        "{datasets: [attic], scenes: {attic: {source: mesh, path: absent.glb}}}",
+        "scenes.attic.path: absent.glb does not",
+    ),
     ("network_camera: {calibration: absent.yaml}", "calibration: absent.yaml: cannot be read as"),
     # YAML that is more than plain values, or none
     ("seed:\n\t1", "line 2: found character '\\t' that cannot start any token"),

@@ -17,6 +17,13 @@ def examples():
     return dict(found)
 
 
+def block(before, language):
+    """The text of the one code block of the page in a language that follows some words."""
+    pattern = rf"{re.escape(before)}[^\n]*\n\n```{language}\n(.*?)```"
+    (found,) = re.findall(pattern, PAGE.read_text(), re.DOTALL)
+    return found
+
+
 def install(folder, modules, entries=None, package="my_methods", group="synfeal.methods"):
     """Write modules by name as an installed package; returns the environment that sees it."""
     sources, info = folder / package, folder / f"{package}-1.0.dist-info"

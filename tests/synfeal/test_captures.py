@@ -408,11 +408,21 @@ def test_a_folder_that_is_two_captures_asks_which(tmp_path):
 PAGE = ROOT / "docs" / "adding.md"
 READ = """
 from pathlib import Path
+import synfeal
 from synfeal.captures.formats import read_capture
+from synfeal.errors import InputError
 capture = read_capture(Path("cart"))
 frame = capture.frames[1]
 print(capture.format, len(capture), frame.world_from_cam[0, 3], frame.read_color().shape)
 print(float(frame.read_depth_m()[5, 7]))
+made = synfeal.unpack("cart", "sequence")
+print(len(list(Path("sequence").glob("*.pose.txt"))), "written")
+table = Path("cart/cart.csv")
+table.write_text(table.read_text().replace("qz", "q3"))
+try:
+    read_capture(Path("cart"))
+except InputError as error:
+    print(error)
 """
 
 
@@ -444,7 +454,18 @@ def test_a_format_of_another_package_is_found_and_read(tmp_path):
         text=True,
         check=True,
     )
-    assert done.stdout.split("\n")[:2] == ["cart 2 2.5 (480, 640, 3)", "1.25"]
+    assert done.stdout.splitlines() == [
+        "cart 2 2.5 (480, 640, 3)",
+        "1.25",
+        "2 written",
+        "cart/cart.csv: column qz missing; its columns are number, x, y, z, qx, qy, q3, qw; record"
+        " the capture again",
+    ]
+
+
+def test_a_capture_without_photographs_is_refused_whatever_reads_it(tmp_path):
+    with pytest.raises(InputError, match="holds no photographs, read as cart"):
+        Capture(tmp_path, "cart", ())
 
 
 @pytest.mark.parametrize("name", ["polycam", "scannet", "record3d", "transforms"])

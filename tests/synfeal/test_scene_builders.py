@@ -12,22 +12,16 @@ from synfeal.collection.prepare import build_scene
 from synfeal.config.collection import SceneConfig
 from synfeal.config.load import describe
 from synfeal.errors import InputError
+from tests.support.added_methods import block
 
-MODULE = """
-import numpy as np
-import trimesh
-from synfeal.mesh.model import MeshPart, TexturedMesh
-
-
-def build(name, seed):
-    box = trimesh.creation.box((4.0 + seed, 3.0, 2.0))
-    rgb = np.random.default_rng(seed).integers(0, 256, (len(box.vertices), 3), np.uint8)
-    return TexturedMesh((MeshPart(name, box.vertices, box.faces[:, ::-1], vertex_rgb=rgb),))
-
+MODULE = (
+    block("`sheds.py`:", "python")
+    + """
 
 def box(name, seed):
     return trimesh.creation.box()
 """
+)
 BUILDS = """
 from pathlib import Path
 from synfeal.collection.prepare import prepare_scene

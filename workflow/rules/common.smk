@@ -24,6 +24,7 @@ from reproduction.design.files import SPLITS, Files
 from reproduction.design.jobs import jobs_of_run
 from reproduction.design.label_sets import INJECTED_PATTERN
 from reproduction.design.labels import check_sources, estimation_parameters
+from reproduction.design.profiles import refuse_idle_scenes
 from reproduction.design.runs import training_parameters
 from reproduction.design.side_tables import (
     SIDE_TABLES,
@@ -54,6 +55,7 @@ try:
         check_mesh_files(CONFIG.scenes)
     check_results(CONFIG.root)
     refuse_old_names(CONFIG.root)
+    refuse_idle_scenes(CONFIG, map(Path, workflow.configfiles))
     DESIGN = read_design(CONFIG)
     check_sources(DESIGN.rows, design_name(CONFIG))
 except InputError as error:
