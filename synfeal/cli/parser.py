@@ -13,6 +13,7 @@ from synfeal import __version__
 from synfeal.cli import capturing, datasets, meshes
 from synfeal.cli.options import Command, in_words_of_today, numbers_apart
 from synfeal.cli.wording import Formatter, Wording
+from synfeal.errors import InputError
 
 DESCRIPTION = (
     "Make data sets for camera localization from meshes; train, localize and evaluate on them."
@@ -45,6 +46,11 @@ OWN_COMMANDS: tuple[Command, ...] = (
 # Installed packages that work on data sets add theirs here: an entry point names a module whose
 # ``COMMANDS`` are a tuple of :class:`synfeal.cli.options.Command`.
 ENTRY_POINTS = "synfeal.commands"
+# Where commands come from that pages name and an installation may lack.
+DISTRIBUTIONS = {
+    "synfeal-baselines": ("build", "train", "map", "localize"),
+    "synfeal-reproduction": ("cost", "profile", "run", "compare"),
+}
 
 
 def added_commands() -> tuple[Command, ...]:
@@ -76,6 +82,25 @@ def build_parser(commands: Sequence[Command]) -> argparse.ArgumentParser:
     return parser
 
 
+def refuse_absent(argv: Sequence[str], commands: Sequence[Command]) -> None:
+    """Refuse a command of a distribution that is not installed, and say which one has it.
+
+    Raises:
+        InputError: The first argument is such a command.
+    """
+    name = argv[0] if argv else ""
+    if name in [command.name for command in commands]:
+        return
+    for distribution, names in DISTRIBUTIONS.items():
+        if name in names:
+            raise InputError(
+                f"synfeal {name}",
+                f"comes with {distribution}, which is not installed beside synfeal",
+                f"pip install {distribution}, or ./{distribution.removeprefix('synfeal-')} of a"
+                " clone (docs/installing.md)",
+            )
+
+
 def run(argv: Sequence[str] | None) -> None:
     """Carry out a command line.
 
@@ -89,6 +114,7 @@ def run(argv: Sequence[str] | None) -> None:
     logging.basicConfig(handlers=[handler], level=logging.WARNING)
     every = tuple(option for command in commands for option in command.options)
     given = in_words_of_today(sys.argv[1:] if argv is None else argv, commands)
+    refuse_absent(given, commands)
     arguments, unknown = build_parser(commands).parse_known_args(list(numbers_apart(given, every)))
     if unknown:  # the command's own parser reports it, with its usage
         arguments.usage.error(f"unrecognized arguments: {' '.join(unknown)}")

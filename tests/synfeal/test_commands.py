@@ -10,7 +10,12 @@ import synfeal
 from synfeal.api import CollectOptions, ViewOptions
 from synfeal.cli import main
 from synfeal.cli.options import destination
-from synfeal.cli.parser import all_commands
+from synfeal.cli.parser import (
+    DISTRIBUTIONS,
+    OWN_COMMANDS,
+    all_commands,
+    refuse_absent,
+)
 from synfeal.config.collect import CollectConfig, LikeConfig, ViewConfig
 from synfeal.config.flags import as_options, flag_of
 from synfeal.errors import InputError
@@ -28,6 +33,20 @@ def room(tmp_path):
 def test_every_command_about_data_is_a_function():
     assert {"collect", "plan", "scan", "inspect", "export", "validate", "preview"} <= set(CALLED)
     assert {"pairs", "evaluate", "unpack", "train", "localize", "map"} <= set(CALLED)
+
+
+def test_a_command_that_is_not_installed_is_refused_with_where_it_comes_from():
+    """Each that a package beside the simulator adds, by the package that has it."""
+    named = {name: of for of, names in DISTRIBUTIONS.items() for name in names}
+    added = set(COMMANDS) - {command.name for command in OWN_COMMANDS}
+    assert added == set(named)
+    for name, distribution in named.items():
+        package = COMMANDS[name].action.__module__.partition(".")[0]
+        assert distribution == f"synfeal-{package}"
+        with pytest.raises(InputError, match=f"synfeal {name}: .* pip install {distribution}"):
+            refuse_absent([name, "--help"], OWN_COMMANDS)
+    refuse_absent(["build"], list(COMMANDS.values()))
+    refuse_absent(["frobnicate"], OWN_COMMANDS)
 
 
 @pytest.mark.parametrize("name", CALLED)
