@@ -26,7 +26,7 @@ from baselines.training.virtual_views import VirtualViews
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.orientation import Orientation, Upright, upright
 from synfeal.camera.photograph import PhotographCamera, Source
-from synfeal.dataset.images import HEIF, read_image
+from synfeal.dataset.images import HEIF, decode_image, read_image
 from synfeal.dataset.packed import NetworkView, fit_frame
 from synfeal.dataset.pose_table import COLUMNS, SEEN
 from synfeal.errors import Argument, InputError
@@ -318,9 +318,28 @@ def open_picture(path: Path) -> Upright:
             a square to be cut out.
     """
     image = read_image(path, "RGB", formats=FORMATS, most_pixels=MOST_PIXELS, remedy=LEAVE_OUT)
+    return _upright(image, path)
+
+
+def decode_picture(content: bytes, name: object, most_pixels: int = MOST_PIXELS) -> Upright:
+    """Decode a picture as :func:`open_picture` does.
+
+    Args:
+        content: Bytes of a PNG or JPEG.
+        name: Its name in messages.
+        most_pixels: Largest width times height.
+
+    Raises:
+        InputError: It is damaged or too large, or is no picture of eight bits per channel.
+    """
+    image = decode_image(content, name, "RGB", formats=FORMATS, most_pixels=most_pixels)
+    return _upright(image, name)
+
+
+def _upright(image: Image.Image, name: object) -> Upright:
     if max(image.size) > MAX_ASPECT * min(image.size):
         raise InputError(
-            path,
+            name,
             f"is {image.width} x {image.height} pixels, too long for a square to be cut"
             f" out{LEAVE_OUT}",
         )

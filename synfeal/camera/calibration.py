@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from json import JSONDecodeError
 from pathlib import Path
@@ -21,7 +21,13 @@ import yaml
 
 from synfeal.camera.programs import as_opencv
 from synfeal.errors import InputError, why
-from synfeal.records.files import MOST_TEXT_BYTES, MOST_YAML_BYTES, PlainLoader, read_text
+from synfeal.records.files import (
+    MOST_TEXT_BYTES,
+    MOST_YAML_BYTES,
+    PlainLoader,
+    read_text,
+    text_of,
+)
 
 # Names under which the same thing is found; the first is the one that messages give.
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx")
@@ -57,6 +63,7 @@ COLMAP_FISHEYE = {
     "OPENCV_FISHEYE": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
 }
 
+YAML_SUFFIXES = (".yaml", ".yml")
 UNKNOWN = (
     "is no calibration file: those of OpenCV, ROS, Kalibr, RealSense, ORB-SLAM and Open3D end in"
     " .yaml, .yml or .json, COLMAP's is cameras.txt"
@@ -154,7 +161,25 @@ def read_calibration(path: Path, with_fisheye: bool = False) -> Calibration:
         InputError: the file is missing, is of another format, or holds no camera that can be used;
             the message names file and field.
     """
-    calibration = _read(path)
+    return _without_fisheye(_read(path), path, with_fisheye)
+
+
+def decode_calibration(content: bytes, name: str, with_fisheye: bool = False) -> Calibration:
+    """Read the camera in the bytes of a file, as :func:`read_calibration` does.
+
+    Args:
+        content: The bytes.
+        name: Name of the file, whose ending tells the format; also in messages.
+        with_fisheye: Take a fisheye camera, too; others refuse it.
+
+    Raises:
+        InputError: It is of another format, or holds no camera that can be used.
+    """
+    decoded = _decoded(Path(name), lambda: text_of(content))
+    return _without_fisheye(decoded, name, with_fisheye)
+
+
+def _without_fisheye(calibration: Calibration, path: object, with_fisheye: bool) -> Calibration:
     if calibration.projection is not None and not with_fisheye:
         raise InputError(
             path,
@@ -165,12 +190,17 @@ def read_calibration(path: Path, with_fisheye: bool = False) -> Calibration:
 
 
 def _read(path: Path) -> Calibration:
+    is_yaml = path.suffix.lower() in YAML_SUFFIXES
+    most_bytes = MOST_YAML_BYTES if is_yaml else MOST_TEXT_BYTES
+    return _decoded(path, lambda: read_text(path, most_bytes=most_bytes))
+
+
+def _decoded(path: Path, text_in: Callable[[], str]) -> Calibration:
     suffix = path.suffix.lower()
     try:
-        if suffix not in (".yaml", ".yml", ".json", ".txt"):
+        if suffix not in (*YAML_SUFFIXES, ".json", ".txt"):
             raise ValueError(BINARY if suffix == ".bin" else UNKNOWN)
-        is_yaml = suffix in (".yaml", ".yml")
-        text = read_text(path, most_bytes=MOST_YAML_BYTES if is_yaml else MOST_TEXT_BYTES)
+        text = text_in()
         if suffix == ".txt":
             return _from_colmap(text)
         if suffix == ".json":

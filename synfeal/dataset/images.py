@@ -49,6 +49,10 @@ MOST_FILE_BYTES = 2**30  # per image: more than its pixels take, stored plainly
 LOOKED_AT, SAME, ONE_COLOR = 4, 2, 0.95
 
 
+class TooManyPixelsError(ValueError):
+    """An image claims more pixels than memory is taken for."""
+
+
 def read_image(
     path: FrameFile,
     mode: str | None = None,
@@ -193,17 +197,21 @@ def opened_image(
         most_pixels: Largest width times height.
 
     Raises:
-        ValueError: The image claims more pixels; no memory is taken for them.
+        TooManyPixelsError: The image claims more pixels; no memory is taken for them.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our bound is lower
         try:
             image = Image.open(file, formats=formats)
         except Image.DecompressionBombError as error:
-            raise ValueError("it claims more pixels than are read; make it smaller") from error
+            raise TooManyPixelsError(
+                "it claims more pixels than are read; make it smaller"
+            ) from error
     with image:
         if image.width * image.height > most_pixels:
-            raise ValueError(f"{image.width} x {image.height} pixels are too many; make it smaller")
+            raise TooManyPixelsError(
+                f"{image.width} x {image.height} pixels are too many; make it smaller"
+            )
         yield image
 
 

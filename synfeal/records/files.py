@@ -88,7 +88,16 @@ def read_text(path: Path, encoding: str = "utf-8", most_bytes: int = MOST_TEXT_B
         OSError: The file cannot be read.
         ValueError: It is no regular file, larger than ``most_bytes``, or not text.
     """
-    text = read_bytes(path, most_bytes).decode(encoding)
+    return text_of(read_bytes(path, most_bytes), encoding)
+
+
+def text_of(content: bytes, encoding: str = "utf-8") -> str:
+    """Decode the bytes of a text file.
+
+    Raises:
+        ValueError: They are not text.
+    """
+    text = content.decode(encoding)
     if "\0" in text:
         raise ValueError("it holds zero bytes, so it is no text")
     return text.replace("\r\n", "\n").replace("\r", "\n")
