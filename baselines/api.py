@@ -289,6 +289,68 @@ def localize(
     )
 
 
+def serve(
+    place: AnyPath,
+    *,
+    camera: AnyPath | None = None,
+    focal_px: float | None = None,
+    exif: bool = True,
+    world: World = "sequence",
+    confidence: float | None = None,
+    refine: AnyPath | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8000,
+    cores: int = 1,
+    queue: int = 16,
+    megabytes: int = 32,
+    megapixels: int = 64,
+) -> None:
+    """Answer over HTTP where photographs were taken, until Ctrl-C or SIGTERM.
+
+    Args:
+        place: Folder of ``build`` or of ``map``.
+        camera: Calibration of photographs that come without one.
+        focal_px: Focal length of such photographs in their pixels, in place of a calibration.
+        exif: Read the focal length from EXIF if neither is given.
+        world: World that poses are given in, where the place was scanned from a sequence.
+        confidence: Least confidence of a pose; None for 0.99.
+        refine: Mesh that the map shows, to refine poses on.
+        host: Address to listen on; ``0.0.0.0`` is every one of this machine.
+        port: Port to listen on; 0 for one that is free.
+        cores: Photographs that are localized at once.
+        queue: Photographs that may wait; who sends another is told to come again.
+        megabytes: Largest request.
+        megapixels: Largest photograph.
+
+    Raises:
+        InputError: The place or a setting cannot be used, the address cannot be listened on, or the
+            extra ``serve`` is not installed.
+    """
+    from baselines.references.confidence import LEAST_CONFIDENCE
+    from baselines.serving.job import ServeJob
+    from baselines.serving.run import serve as run
+
+    folder = Path(place)
+    if folder.is_file():
+        raise InputError(
+            folder, "is a file, and places and maps are folders", "give one of build or map"
+        )
+    job = ServeJob(
+        place=folder,
+        camera=_photographs(camera, focal_px, exif),
+        world=world,
+        least_confidence=LEAST_CONFIDENCE if confidence is None else confidence,
+        refine=None if refine is None else Path(refine),
+        host=host,
+        port=port,
+        cores=cores,
+        queue=queue,
+        megabytes=megabytes,
+        megapixels=megapixels,
+    )
+    run(job)
+
+
 def _paths(some: AnyPath | Sequence[AnyPath]) -> list[Path]:
     return [Path(each) for each in ([some] if isinstance(some, str | Path) else some)]
 

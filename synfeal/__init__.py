@@ -15,8 +15,8 @@ From one textured 3D mesh to a 7-Scenes data set with exact poses::
     print(synfeal.pairs("mydata", "mydata-pairs", per_frame=20))
 
 Every command is a function of the same name, whose keywords are the command's options; ``build``,
-``train``, ``localize`` and ``map`` come with the package ``baselines``. ``docs/architecture.md``
-says what is where.
+``train``, ``localize``, ``map`` and ``serve`` come with the package ``baselines``.
+``docs/architecture.md`` says what is where.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from baselines.cli import mapping, places, training
+from baselines.cli import mapping, places, serving, training
 from synfeal.cli.options import command, keywords, option
 
 DEVICES = ("auto", "cpu", "cuda")
@@ -44,4 +44,4 @@ def localize(arguments: argparse.Namespace) -> None:
     report.report_localized(arguments, done)
 
 
-COMMANDS = (places.build, training.train, mapping.map, localize)
+COMMANDS = (places.build, training.train, mapping.map, localize, serving.serve)

@@ -39,14 +39,16 @@ CALIBRATION_OPTIONS = (
     ),
 )
 
+WORLD_OPTION = option(
+    "--world",
+    "world that poses are written in, where the place was scanned from a sequence (sequence)",
+    choices=("sequence", "mesh"),
+    default="sequence",
+)
+
 LOCALIZE_OPTIONS = (
     *CALIBRATION_OPTIONS,
-    option(
-        "--world",
-        "world that poses are written in, where the place was scanned from a sequence (sequence)",
-        choices=("sequence", "mesh"),
-        default="sequence",
-    ),
+    WORLD_OPTION,
     option(
         "--turns",
         "with a model: average each pose over N pairs of opposite virtual rotations of the camera"

@@ -11,6 +11,7 @@ from synfeal.camera.calibration import read_calibration
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.captures.unpack import RECORD as CAPTURE_RECORD
 from synfeal.errors import InputError, read_as
+from synfeal.mesh.checks import SUFFIXES
 from synfeal.records.files import read_json
 
 RECORD = "place.json"
@@ -115,3 +116,13 @@ def open_map(folder: Path, camera: PhotographCamera) -> tuple[Path, PhotographCa
     if not place.camera.is_file():  # it was built from a mesh
         return place.map, camera
     return place.map, replace(camera, otherwise=read_calibration(place.camera))
+
+
+def shown_mesh(folder: Path) -> Path | None:
+    """Return the mesh that the map of a place shows; None where it is not there, or of a map."""
+    if not is_place(folder):
+        return None
+    place, record = read_place(folder)
+    source = Path(record["source"]["path"])
+    candidates = [place.scan] + ([source] if source.suffix.lower() in SUFFIXES else [])
+    return next((file for file in candidates if file.is_file()), None)

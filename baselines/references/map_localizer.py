@@ -84,6 +84,7 @@ class MapLocalizer:
 
     Attributes:
         world: Whose coordinates poses are in; None where there is only one.
+        out_from_map: Rigid motion (4, 4) to that world from the map's.
     """
 
     def __init__(
@@ -101,7 +102,10 @@ class MapLocalizer:
         self._refine = refine
         self._scale = scale
         self.world: World | None = None if place.sequence_from_world is None else world
-        self._out_from_map = place.sequence_from_world if self.world == "sequence" else None
+        sequence = place.sequence_from_world
+        self.out_from_map = np.eye(4)
+        if sequence is not None and world == "sequence":
+            self.out_from_map = sequence
 
     def locate(
         self, image: Image.Image, turn: Orientation, name: object, camera: PhotographCamera
@@ -133,7 +137,7 @@ class MapLocalizer:
         pose = answer.world_from_cam if status == FOUND else np.full((4, 4), np.nan)
         return Located(
             status=status,
-            world_from_cam=pose if self._out_from_map is None else self._out_from_map @ pose,
+            world_from_cam=self.out_from_map @ pose,
             answer=answer,
             calibration=calibration,
             is_turned=camera.turns_with(image, turn),

@@ -185,7 +185,7 @@ def read_redrawn(place: StructureMap, file: Path, folder: Path, seed: int = 0) -
         InputError: The mesh cannot be read, or the map shows something else.
     """
     mesh = load_mesh(file, place.mesh_file.up_axis, place.mesh_file.unit_m)
-    opened = Redrawn(place, mesh, _mesh_from_map(place, file), seed)
+    opened = Redrawn(place, mesh, mesh_from_map(place, file), seed)
     share = opened.share_on_mesh()
     if share < LEAST_ON_MESH:
         raise InputError(
@@ -197,7 +197,7 @@ def read_redrawn(place: StructureMap, file: Path, folder: Path, seed: int = 0) -
     return opened
 
 
-def _mesh_from_map(place: StructureMap, file: Path) -> Array:
+def mesh_from_map(place: StructureMap, file: Path) -> Array:
     """Find the rigid motion (4, 4) from the world of a map to that of a scan, by the sequence's."""
     record = read_scan_record(file)
     if record is None or place.sequence_from_world is None:

@@ -44,7 +44,8 @@ def test_every_dependency_is_locked_within_its_range():
     for name in ("baselines", "reproduction"):
         above = tomllib.loads(read(f"{name}/pyproject.toml"))
         needed += above["tool"]["hatch"]["metadata"]["hooks"]["custom"]["dependencies"]
-        needed += above["project"].get("optional-dependencies", {}).get("slurm", [])
+        extras = above["project"].get("optional-dependencies", {})
+        needed += [*extras.get("serve", []), *extras.get("slurm", [])]
     for text in needed:
         requirement = Requirement(text)
         version = (locked | slurm | docs)[canonicalize_name(requirement.name)]

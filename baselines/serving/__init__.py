@@ -1,0 +1,1 @@
+"""A place served over HTTP: photographs in, poses out."""
