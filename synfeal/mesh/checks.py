@@ -253,7 +253,9 @@ def repaired(part: MeshPart, findings: Findings) -> MeshPart:
             f"part '{part.name}': {bad.sum()} texture coordinates that are NaN or infinite set to 0"
         )
         part = replace(part, uv=np.where(bad, 0.0, part.uv))
-    unused = len(part.vertices_m) - len(np.unique(faces))  # they would stretch its bounds
+    is_unused = np.ones(len(part.vertices_m), np.bool_)  # they would stretch its bounds
+    is_unused[faces] = False
+    unused = int(is_unused.sum())
     if not unused:
         return part
     noun = "vertex" if unused == 1 else "vertices"

@@ -52,7 +52,7 @@ def triangulated(points: Floats, counts: Ints, corners: Ints) -> Triangulation:
     first = np.cumsum(counts) - counts
     area, covered = np.zeros(len(counts)), np.zeros(len(counts))
     pieces, owners = [], []
-    for count in np.unique(counts):
+    for count in np.flatnonzero(np.bincount(counts)):
         group = np.flatnonzero(counts == count)
         for start in range(0, len(group), BLOCK):
             block = group[start : start + BLOCK]
