@@ -294,7 +294,7 @@ def shared_errors_stay(root: Path) -> Finding | None:
         SHAPE_CHANGES if _has_by_frame(root) else SHAPES_ROWS,
         f"Labels {_noise(off_in_all_shapes(root))} off change the networks' orientation error by"
         f" {_change(own.value)} if every frame has its own error, by {_change(space.value)} if"
-        " space is bent.",
+        " all share one smooth distortion of space.",
     )
 
 
@@ -326,9 +326,9 @@ def noise_is_mostly_the_yardsticks(root: Path) -> Finding | None:
         f" {percent(harm[0])} and {percent(harm[1])}.",
         "labels or truth, as each sentence says",
         "table3_inconsistencies",
-        f"Noise changes the orientation error against noisy test labels by"
-        f" {_change(seen[1].value)}, against the true poses by {_change(harm[1].value)}: most of it"
-        " is in the yardstick.",
+        f"Noise in all labels changes the networks' orientation error by"
+        f" {_change(seen[1].value)} against the noisy test labels and by"
+        f" {_change(harm[1].value)} against the true poses: most of it is in the test labels.",
         _told_by(root, asked),
     )
 
@@ -436,7 +436,7 @@ def frames_and_images(root: Path, controls: Path) -> Finding | None:
         "labels and truth alike",
         "table4_size",
         f"From {SMALL} to {LARGE} frames the position error changes by {_change(whole[0].value)},"
-        f" with no more images shown by {_change(frames[0].value)}.",
+        f" and by {_change(frames[0].value)} where no more images are shown.",
         controls.name,
     )
 

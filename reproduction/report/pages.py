@@ -22,6 +22,7 @@ import pandas as pd
 from baselines.config.learning import MODELS
 from reproduction.claims.table import claims_markdown
 from reproduction.real.findings import real_findings, real_headline, real_short, real_table
+from reproduction.report.effects_figure import effects_digest, effects_picture
 from reproduction.report.findings import (
     MEASURES,
     can_tell,
@@ -38,7 +39,7 @@ from reproduction.report.paper_figure import cells_digest, paper_picture
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
 from reproduction.report.realisations import PAPER_FRAMES, realisations_table
-from reproduction.report.reproduced import reproduced
+from reproduction.report.reproduced import effects, reproduced
 from reproduction.report.run_anew import run_anew, training_runs
 from reproduction.report.stamped import shows, write_stamped
 from reproduction.runs.results import read_result
@@ -65,6 +66,7 @@ REAL_PAGE, REAL = Path("docs/real.md"), "real"
 OTHERS_POSES = Path("results/benchmarks/published_poses.csv")
 FIGURE = Path("docs/images/findings.png")
 PAPER_FIGURE = Path("docs/images/paper_against_ours.png")
+EFFECTS_FIGURE = Path("docs/images/effects.png")
 HEADLINES = ("night", "mini")
 LIMITS_NOTE = (
     "Brackets hold 95 % limits over test paths and training runs. The changes with label errors by"
@@ -311,6 +313,11 @@ def stale(check: bool) -> list[Path]:
     drawn = panels(shown) if can_tell(shown) else []
     if drawn and not is_drawn_from(FIGURE, drawn):
         writers[FIGURE] = partial(write_findings_figure, drawn, FIGURE)
+    if (PUBLISHED / "controls").is_dir():
+        of_claims = effects(shown)
+        if not shows(EFFECTS_FIGURE, effects_digest(of_claims)):
+            content = effects_picture(of_claims)
+            writers[EFFECTS_FIGURE] = partial(write_stamped, content, EFFECTS_FIGURE)
     cells = paper_cells(shown)
     if len(cells) and not shows(PAPER_FIGURE, cells_digest(cells)):
         content = paper_picture(cells)

@@ -90,9 +90,16 @@ def ratios(cells: pd.DataFrame, quantity: str) -> dict[str, float]:
 def order_of_networks(cells: pd.DataFrame, quantity: str) -> Order:
     """Correlate the ranks of ours and print in Table 4, within rows and within networks."""
     sizes = cells[(cells.table == SIZES) & (cells.quantity == quantity)]
-    return Order(*(_mean_correlation(sizes, key) for key in ("row", "model")))
+    return Order(*(float(np.mean(_correlations(sizes, key))) for key in ("row", "model")))
 
 
-def _mean_correlation(cells: pd.DataFrame, key: str) -> float:
-    found = [spearmanr(group.printed, group.ours)[0] for _, group in cells.groupby(key)]
-    return float(np.mean(found))
+def row_orders(cells: pd.DataFrame, quantity: str) -> list[float]:
+    """List the rank correlation among the networks of each row of Table 4."""
+    return _correlations(cells[(cells.table == SIZES) & (cells.quantity == quantity)], "row")
+
+
+def _correlations(cells: pd.DataFrame, key: str) -> list[float]:
+    return [
+        float(spearmanr(group.printed, group.ours)[0])
+        for _, group in cells.groupby(key, sort=False)
+    ]

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from reproduction.report.paper_cells import order_of_networks, paper_cells, ratios
+from reproduction.report.effects_figure import effects_digest, effects_picture
+from reproduction.report.intervals import Interval
+from reproduction.report.paper_cells import order_of_networks, paper_cells, ratios, row_orders
 from reproduction.report.paper_figure import cells_digest, paper_figure, paper_picture
-from reproduction.report.reproduced import reproduced
+from reproduction.report.reproduced import effects, over_smaller, reproduced
 from reproduction.report.stamped import shows, write_stamped
 from synfeal.errors import InputError
 
@@ -98,15 +100,65 @@ def test_orders_that_agree_and_orders_that_are_reversed(cells):
     assert list(ratios(same, "position").values()) == pytest.approx([3] * 5)
 
 
-def test_the_lines_say_what_the_cells_say(cells):
-    line = reproduced(NIGHT).splitlines()[2]
-    text = line.replace("−", "-")
-    within = [order_of_networks(cells, quantity) for quantity in OURS]
-    assert [float(n) for n in re.findall(r"[+-]\d\.\d\d", text)] == [
-        round(one[part], 2) for part in (0, 1) for one in within
-    ]
-    shown = [float(n) for n in re.findall(r"\w (\d\.\d\d)", line)]
-    assert shown == [round(value, 2) for value in ratios(cells, "position").values()]
+def test_the_line_on_networks_says_what_the_cells_say(cells):
+    line = reproduced(NIGHT).splitlines()[2].replace("−", "-")
+    within = [order_of_networks(cells, quantity).within_rows for quantity in OURS]
+    assert [float(n) for n in re.findall(r"[+-]\d\.\d\d", line)] == [round(n, 2) for n in within]
+    orders = row_orders(cells, "position")
+    assert f"over the {len(orders)} rows" in line
+    assert f"negative in {sum(order < 0 for order in orders)} rows" in line
+
+
+def claim(run, name):
+    with NIGHT.with_name(run).joinpath("claims.csv").open(newline="") as lines:
+        return next(row for row in csv.DictReader(lines) if row["id"] == name)
+
+
+def percents(text):
+    """Percentages of a text in order, without those in brackets."""
+    return [float(n) for n in re.findall(r"([+-][\d.]+) %", re.sub(r"\(.*?\)", "", text))]
+
+
+@pytest.mark.parametrize("place", range(5))
+def test_effects_are_those_that_claims_were_judged_by(place):
+    effect = effects(NIGHT)[place]
+    row = claim(effect.run, effect.claim)
+    values, ends = (percents(row[f"{of}_{effect.against}"])[:4] for of in ("measured", "interval"))
+    paper = [float(n) for n in re.findall(r"([+-]?\d+) %", row["published"])]
+    if effect.claim == "C6":  # told as shares of the error with noise
+        values, ends, paper = (
+            [100 * (1 / (1 - n / 100) - 1) for n in own] for own in (values, ends, paper)
+        )
+    found = [100 * (change.value - 1) for change in effect.ours]
+    assert found == pytest.approx(values[:2], abs=1e-6)
+    limits = [100 * (end - 1) for change in effect.ours for end in (change.low, change.high)]
+    assert limits == pytest.approx(ends, abs=1e-6)
+    if effect.paper is None:
+        assert (effect.claim, effect.against) == ("C6", "true")
+    else:
+        assert [100 * (factor - 1) for factor in effect.paper] == pytest.approx(paper)
+
+
+def test_a_quarter_of_the_larger_is_a_third_of_the_smaller():
+    assert over_smaller(Interval(1.25, 1.2, 1.5)) == pytest.approx((4 / 3, 1.25, 2))
+
+
+def test_the_noise_of_the_paper_is_that_of_its_table():
+    """Table 3: PoseNet2 without noise and with 0.30 m and 20°, both errors."""
+    (noise,) = (one for one in effects(NIGHT) if (one.claim, one.against) == ("C6", "labels"))
+    cells = [row for row in rows("table3_inconsistencies") if row["model"] == "posenet2"]
+    of = {row["noise_m"]: row for row in cells if row["block"] == "both"}
+    for factor, name in zip(noise.paper, PAPER.values(), strict=True):
+        printed = float(of["0.3"][name]) / float(of["0"][name])
+        assert factor == pytest.approx(printed, rel=0.03)  # the paper rounds to whole percents
+
+
+def test_a_picture_of_effects_shows_these_effects_and_no_others(tmp_path):
+    found = effects(NIGHT)
+    out = tmp_path / "effects.png"
+    write_stamped(effects_picture(found), out)
+    assert shows(out, effects_digest(found))
+    assert not shows(out, effects_digest(found[:4]))
 
 
 def test_a_run_that_the_lines_need_is_named_where_it_is_missing(tmp_path):
