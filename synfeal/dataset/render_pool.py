@@ -110,8 +110,7 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
             for future in ended:
                 out, poses = running.pop(future)
                 seconds, records = future.result()
-                for record in records:
-                    logging.getLogger(record.name).handle(record)
+                _log_here(records)
                 progress.part_done(out.name, len(poses), seconds)
     except BrokenProcessPool as error:
         raise InputError(
@@ -122,6 +121,14 @@ def _render_parallel(studio: Studio, tasks: list[Task], workers: int, progress: 
     finally:
         stop.set()
         executor.shutdown(cancel_futures=True)
+
+
+def _log_here(records: list[logging.LogRecord]) -> None:
+    """Log what a worker process said, by the handlers and levels of this process."""
+    for record in records:
+        logger = logging.getLogger(record.name)
+        if logger.isEnabledFor(record.levelno):
+            logger.handle(record)
 
 
 _worker: dict[str, Any] = {}  # what a worker process keeps between sequences
