@@ -37,6 +37,7 @@ from synfeal.mesh.checks import SUFFIXES
 from synfeal.records.files import read_json, write_json
 from synfeal.records.progress import Outlook, Progress, duration_text
 from synfeal.scanning.camera import CameraOptions
+from synfeal.scanning.fusion import load_open3d
 from synfeal.scanning.run import ScanJob, scan
 
 log = logging.getLogger("synfeal")
@@ -123,6 +124,7 @@ def build(job: PlaceJob, say: Callable[[str], None] = print) -> dict[str, Any]:
     if not job.is_mesh and not place.frames.exists():
         capture = read_capture(job.source, job.format)
         _refuse_without_depth(job, capture)
+        load_open3d()  # now, not after minutes of unpacking
     record = _begin(job, place)
     run = _Run(_expected_s(job, 0 if capture is None else len(capture)), say)
     if job.is_mesh:

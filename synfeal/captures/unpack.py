@@ -216,8 +216,8 @@ def _write_depth(frame: CapturedFrame, camera: Calibration, stem: Path, far: _Fa
     if depth_m.shape != (own.height, own.width):
         raise InputError(
             frame.name,
-            f"its depth is of {depth_m.shape[1]}x{depth_m.shape[0]} pixels, that of the first"
-            f" frames of {own.width}x{own.height}; are all of one capture?",
+            f"its depth is of {depth_m.shape[1]}x{depth_m.shape[0]} pixels, its calibration of"
+            f" {own.width}x{own.height}; are both of one capture?",
         )
     if not _is_kept(own, camera):
         depth_m = redrawn_depth(depth_m, own, camera)

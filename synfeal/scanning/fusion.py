@@ -29,6 +29,23 @@ Array = NDArray[np.float64]
 BLOCK_VOXELS, BLOCKS, TRUNCATION_VOXELS, MIN_WEIGHT = 8, 20_000, 4.0, 1.5
 
 
+def load_open3d() -> Any:
+    """Import Open3D, which fuses depth.
+
+    Raises:
+        InputError: It is not installed.
+    """
+    try:
+        import open3d
+    except ImportError as error:
+        raise InputError(
+            "scan",
+            f"needs Open3D, which does not load here ({error})",
+            "pip install 'synfeal[scan]'",
+        ) from error
+    return open3d
+
+
 def fuse_depth(
     grid: Any,
     depth: Any,
@@ -92,14 +109,7 @@ def fuse(
     Raises:
         InputError: Open3D is not installed, or no depth image shows anything.
     """
-    try:
-        import open3d as o3d
-    except ImportError as error:
-        raise InputError(
-            "scan",
-            f"needs Open3D, which does not load here ({error})",
-            "pip install 'synfeal[scan]'",
-        ) from error
+    o3d = load_open3d()
     kind, scalar = o3d.core.float32, o3d.core.SizeVector([1])
     grid = o3d.t.geometry.VoxelBlockGrid(
         ("tsdf", "weight"), (kind, kind), (scalar, scalar), voxel_m, BLOCK_VOXELS, BLOCKS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -163,6 +164,15 @@ def test_a_capture_without_depth_is_refused_before_anything_is_written(capture, 
     shutil.copytree(capture, bare, ignore=shutil.ignore_patterns("depth_*", "conf_*"))
     assert main(["build", str(bare), "--out", str(tmp_path / "place")]) == 1
     assert "has no depth, of which a scan is made" in capsys.readouterr().err
+    assert not (tmp_path / "place").exists()
+
+
+def test_without_open3d_a_capture_is_refused_before_anything_is_written(
+    capture, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "open3d", None)  # as where it is not installed
+    assert main(["build", str(capture), "--out", str(tmp_path / "place")]) == 1
+    assert "needs Open3D" in capsys.readouterr().err
     assert not (tmp_path / "place").exists()
 
 

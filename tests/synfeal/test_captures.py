@@ -120,6 +120,16 @@ def test_unpacked_it_is_a_posed_sequence(captured, tmp_path):
     assert record["names"] == [frame.name for frame in capture.frames]
     assert record["camera"]["color"]["fx"] == pytest.approx(FOCAL_PX)
     assert read_calibration(done.folder / "capture.json") == done.color
+    again = read_capture(done.folder)  # as `inspect` and `build` read it
+    assert again.frames[0].camera == done.color
+    assert again.up == capture.up
+    np.testing.assert_allclose(again.depth_from_color, capture.depth_from_color)
+    depth_m = again.frames[0].read_depth_m()
+    assert depth_m.shape == (
+        again.frames[0].depth_camera.height,
+        again.frames[0].depth_camera.width,
+    )
+    assert 1.0 < np.median(depth_m[depth_m > 0]) < 5.0
 
 
 def test_names_are_unique_and_in_order(captured):
