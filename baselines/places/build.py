@@ -17,6 +17,7 @@ from baselines.places.check import (
     CHECKED,
     Known,
     check_of,
+    learn_of_photographs,
     localize_known,
     photographs_of,
     renderings_of,
@@ -146,6 +147,7 @@ def build(job: PlaceJob, say: Callable[[str], None] = print) -> dict[str, Any]:
     with run.stage(CHECK, place.check, f"map tried on {known.kind}") as due:
         if due:
             localize_known(place, known, job.seed)
+    learn_of_photographs(place, known)
     record["check"] = check_of(place, known)
     record["trial"] = trial_of(place)
     if job.train:

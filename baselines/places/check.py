@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ import synfeal
 from baselines.places.place import Place
 from baselines.references.localized import localize_in_map
 from baselines.references.map_localizer import FOUND
-from baselines.references.stated_errors import held_out_coverage, read_trial
+from baselines.references.stated_errors import add_photographs, held_out_coverage, read_trial
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.pose_table import STATED
@@ -97,15 +97,8 @@ def check_of(place: Place, known: Known) -> dict[str, Any]:
     Raises:
         InputError: The file names other pictures.
     """
-    table = pd.read_csv(place.check)
-    truth = known.world_from_cam[_rows_of(table["image"], known, place)]
-    found = (table["status"] == FOUND).to_numpy()
-    position_m, angle_deg = np.full(len(table), np.inf), np.full(len(table), np.inf)
-    if found.any():
-        values = table.loc[found, ["tx", "ty", "tz", "qw", "qx", "qy", "qz"]].to_numpy(np.float64)
-        poses = pose_from_quat(values[:, :3], values[:, 3:])
-        error_m, error_rad = pose_error(poses, truth[found])
-        position_m[found], angle_deg[found] = error_m, np.degrees(error_rad)
+    checked = _checked(place, known)
+    table, truth, found, position_m, angle_deg = checked
     close = (position_m <= CLOSE_M) & (angle_deg <= CLOSE_DEG)
     return {
         "kind": known.kind,
@@ -115,7 +108,7 @@ def check_of(place: Place, known: Known) -> dict[str, Any]:
         "position_90_m": _percentile(position_m[found], 90),
         "orientation_deg": _percentile(angle_deg[found], 50),
         "within_5cm_5deg": float(close.mean()),
-        "stated": _stated_of(table, {POSITION: position_m, ORIENTATION: angle_deg}),
+        "stated": _stated_of(checked),
         "places": [
             {
                 "position_m": pose[:3, 3].round(3).tolist(),
@@ -142,14 +135,66 @@ def trial_of(place: Place) -> dict[str, Any]:
     }
 
 
-def _stated_of(table: pd.DataFrame, errors: dict[str, Array]) -> dict[str, Any]:
-    """Compare errors (N,) with the radii that the lines of ``check.csv`` state, if they do."""
+class _Checked(NamedTuple):
+    """Lines of ``check.csv`` with known poses (N, 4, 4), which were localized (N,), errors (N,)."""
+
+    table: pd.DataFrame
+    truth: Array
+    found: NDArray[np.bool_]
+    position_m: Array
+    orientation_deg: Array
+
+    @property
+    def stated(self) -> Array:
+        """Radii (N, 4) that the poses state; NaN where they state none."""
+        return self.table.reindex(columns=list(STATED)).to_numpy(np.float64)
+
+
+def _checked(place: Place, known: Known) -> _Checked:
+    """Read ``check.csv``, and compare poses with those that are known."""
+    table = pd.read_csv(place.check)
+    truth = known.world_from_cam[_rows_of(table["image"], known, place)]
+    found = (table["status"] == FOUND).to_numpy()
+    position_m, angle_deg = np.full(len(table), np.inf), np.full(len(table), np.inf)
+    if found.any():
+        values = table.loc[found, ["tx", "ty", "tz", "qw", "qx", "qy", "qz"]].to_numpy(np.float64)
+        poses = pose_from_quat(values[:, :3], values[:, 3:])
+        error_m, error_rad = pose_error(poses, truth[found])
+        position_m[found], angle_deg[found] = error_m, np.degrees(error_rad)
+    return _Checked(table, truth, found, position_m, angle_deg)
+
+
+def learn_of_photographs(place: Place, known: Known) -> None:
+    """Let errors of photographs widen the radii that poses state, unless they did before.
+
+    Renderings are no second trial: the first one was of such.
+    """
+    if known.kind == RENDERED or read_trial(place.map).photographs is not None:
+        return
+    checked = _checked(place, known)
+    stated = checked.stated
+    both = checked.found & np.isfinite(stated).all(axis=1)
+    add_photographs(
+        place.map,
+        error_m=checked.position_m[both],
+        error_deg=checked.orientation_deg[both],
+        stated=stated[both],
+    )
+
+
+def _stated_of(checked: _Checked) -> dict[str, Any]:
+    """Compare errors with the radii that the lines of ``check.csv`` state, if they do.
+
+    They are those of the trial's frames alone, so of photographs they show what the scan and the
+    capture add.
+    """
     found = {}
-    for (name, error), columns in zip(errors.items(), (STATED[:2], STATED[2:]), strict=True):
-        radii = table.reindex(columns=list(columns)).to_numpy(np.float64)
-        known = np.isfinite(radii).all(axis=1) & np.isfinite(error)
-        if known.any():
-            found[name] = [one._asdict() for one in coverage(error[known], *radii[known].T)]
+    errors = {POSITION: checked.position_m, ORIENTATION: checked.orientation_deg}
+    radii = (checked.stated[:, :2], checked.stated[:, 2:])
+    for (name, error), radius in zip(errors.items(), radii, strict=True):
+        both = np.isfinite(radius).all(axis=1) & np.isfinite(error)
+        if both.any():
+            found[name] = [one._asdict() for one in coverage(error[both], *radius[both].T)]
     return found
 
 

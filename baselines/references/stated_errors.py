@@ -11,13 +11,15 @@ probability at least, whatever the distribution (split conformal prediction: Pap
 ECML 2002; Lei et al., JASA 2018).
 
 The trial knows the errors of matching in the map, not those of the capture that it was built from.
+Photographs of known pose, which the capture of a place has, are therefore a second trial, and the
+wider of both radii is stated.
 """
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 import torch
@@ -51,7 +53,7 @@ TRIED = 100  # frames of the map
 # Frames before and after one that is tried, as a share of all: those of one path or of one stretch
 # of a sequence were taken side by side, and are left out with it.
 LEFT_OUT = 0.02
-# Poses found; of fewer, the 95 % quantile is their largest.
+# Poses found. With fewer than 19, no rank holds 95 % of new ones.
 FEWEST = 24
 # Ranges of a photograph as large as the map's frames; those of training are for images of 64
 # pixels.
@@ -76,33 +78,23 @@ class Stated(NamedTuple):
     orientation_95_deg: float
 
 
-class Trial(Strict):
-    """Content of ``trial.json``: frames that were shown to a map, and the poses that it found.
+class Poses(Strict):
+    """Poses that a map found of pictures of known pose.
 
     Attributes:
-        format: Kind of the file.
-        version: Of its layout.
-        map_sha256: Hash of the ``map.json`` that was tried.
-        seed: Of light, lens and sensor.
-        tried: Frames shown, localized or not.
         position_m: Error of each pose found.
         position_spread_m: What its inliers say of that error.
         orientation_deg: Error of each pose found.
         orientation_spread_deg: What its inliers say of that error.
     """
 
-    format: Literal["synfeal trial of a map"] = "synfeal trial of a map"
-    version: Literal[1] = 1
-    map_sha256: str
-    seed: int
-    tried: int
     position_m: tuple[NonNegative, ...]
     position_spread_m: tuple[Positive, ...]
     orientation_deg: tuple[NonNegative, ...]
     orientation_spread_deg: tuple[Positive, ...]
 
     @model_validator(mode="after")
-    def _one_row_each(self) -> Trial:
+    def _one_row_each(self) -> Self:
         columns = (
             self.position_m,
             self.position_spread_m,
@@ -114,6 +106,26 @@ class Trial(Strict):
         return self
 
 
+class Trial(Poses):
+    """Content of ``trial.json``: frames that were shown to a map, and the poses that it found.
+
+    Attributes:
+        format: Kind of the file.
+        version: Of its layout.
+        map_sha256: Hash of the ``map.json`` that was tried.
+        seed: Of light, lens and sensor.
+        tried: Frames shown, localized or not.
+        photographs: Poses of photographs of the capture; None where there are none.
+    """
+
+    format: Literal["synfeal trial of a map"] = "synfeal trial of a map"
+    version: Literal[1] = 1
+    map_sha256: str
+    seed: int
+    tried: int
+    photographs: Poses | None = None
+
+
 class ErrorScale:
     """Turns spreads into stated radii.
 
@@ -122,34 +134,43 @@ class ErrorScale:
     """
 
     def __init__(self, trial: Trial) -> None:
-        self._position = _factors(trial.position_m, trial.position_spread_m)
-        self._orientation = _factors(trial.orientation_deg, trial.orientation_spread_deg)
+        tried: list[Poses] = [trial]
+        if trial.photographs is not None and len(trial.photographs.position_m) >= FEWEST:
+            tried.append(trial.photographs)
+        position = [_factors(one.position_m, one.position_spread_m) for one in tried]
+        orientation = [_factors(one.orientation_deg, one.orientation_spread_deg) for one in tried]
+        self._position = np.max(position, axis=0)
+        self._orientation = np.max(orientation, axis=0)
 
     def stated(self, spread: Spread) -> Stated:
         """Return the radii of a pose of this spread."""
-        position = [spread.position_m * factor for factor in self._position]
-        orientation = [spread.orientation_deg * factor for factor in self._orientation]
-        return Stated(*position, *orientation)
+        position_m = (spread.position_m * self._position).tolist()
+        orientation_deg = (spread.orientation_deg * self._orientation).tolist()
+        return Stated(*position_m, *orientation_deg)
+
+    def spreads(self, stated: Array) -> tuple[Array, Array]:
+        """Return the spreads (N,) of position and orientation of poses that state radii (N, 4)."""
+        return stated[:, 1] / self._position[1], stated[:, 3] / self._orientation[1]
 
 
 def _factors(errors: tuple[float, ...], spreads: tuple[float, ...]) -> list[float]:
-    """Compute the ratios of error to spread that hold 68 and 95 % of new poses."""
+    """Compute the ratios (2,) of error to spread that hold 68 and 95 % of new poses."""
     ratios = np.sort(np.array(errors) / np.array(spreads))
     ranks = (math.ceil((len(ratios) + 1) * level) for level in (SD_LEVEL, WIDE_LEVEL))
     return [float(ratios[min(rank, len(ratios)) - 1]) for rank in ranks]
 
 
-def held_out_coverage(trial: Trial) -> dict[str, list[Coverage]]:
-    """Judge the stated errors of each half of a trial by the factors of the other half.
+def held_out_coverage(tried: Poses) -> dict[str, list[Coverage]]:
+    """Judge errors that half of some poses state by the factors of the other half.
 
     Returns:
         Coverage of ``position_m`` and of ``orientation_deg``; nothing where a half has too few.
     """
-    if len(trial.position_m) < 2 * FEWEST:
+    if len(tried.position_m) < 2 * FEWEST:
         return {}
     columns = {
-        POSITION: (trial.position_m, trial.position_spread_m),
-        ORIENTATION: (trial.orientation_deg, trial.orientation_spread_deg),
+        POSITION: (tried.position_m, tried.position_spread_m),
+        ORIENTATION: (tried.orientation_deg, tried.orientation_spread_deg),
     }
     found = {}
     for name, (errors, spreads) in columns.items():
@@ -212,6 +233,29 @@ def write_trial(place: StructureMap, frames: MapFrames, folder: Path, seed: int 
     trial = try_map(place, frames, file_sha256(folder / RECORD), seed)
     write_json(folder / FILE, trial.model_dump(mode="json"))
     return trial
+
+
+def add_photographs(folder: Path, error_m: Array, error_deg: Array, stated: Array) -> None:
+    """Add photographs of known pose to the trial of a map, if it states errors.
+
+    Args:
+        folder: The map.
+        error_m: Errors (N,) of the positions of those that were localized.
+        error_deg: Errors (N,) of their orientations.
+        stated: Radii (N, 4) that they state, columns of ``STATED``.
+    """
+    scale = read_scale(folder)
+    if scale is None or not len(stated):
+        return
+    spread_m, spread_deg = scale.spreads(stated)
+    photographs = Poses(
+        position_m=error_m.tolist(),
+        position_spread_m=spread_m.tolist(),
+        orientation_deg=error_deg.tolist(),
+        orientation_spread_deg=spread_deg.tolist(),
+    )
+    trial = read_trial(folder).model_copy(update={"photographs": photographs})
+    write_json(folder / FILE, trial.model_dump(mode="json"))
 
 
 def try_map(place: StructureMap, frames: MapFrames, map_sha256: str, seed: int) -> Trial:

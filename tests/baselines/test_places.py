@@ -112,6 +112,8 @@ def test_the_report_plots_stated_errors(place):
     assert table.loc[table["status"] == "localized", "position_95_m"].gt(0).all()
     assert 0.8 <= levels[0.95] <= levels[0.99] <= 1.0
     assert record["trial"]["localized"] <= record["trial"]["pictures"] == 50
+    trial = json.loads((place / "map/trial.json").read_text())
+    assert len(trial["photographs"]["position_m"]) == record["check"]["localized"]
     page = (place / "report.html").read_text()
     plotted = [of for of in ("trial", "check") if record[of]["stated"]]
     assert page.count("<polyline") == 2 * len(plotted)

@@ -13,7 +13,9 @@ from baselines.references.stated_errors import (
     FEWEST,
     FILE,
     ErrorScale,
+    Poses,
     Trial,
+    add_photographs,
     held_out_coverage,
     read_scale,
 )
@@ -77,6 +79,31 @@ def test_radii_grow_with_what_inliers_say():
     np.testing.assert_allclose(far, 4.0 * near)
     assert near[0] < near[1]
     assert near[2] < near[3]
+
+
+@pytest.mark.parametrize(("factor", "widened"), [(4.0, 4.0), (0.1, 1.0)])
+def test_photographs_widen_radii_and_never_narrow_them(factor, widened):
+    trial = drawn(normal, 100, 1)
+    errors = trial.model_dump(include=set(Poses.model_fields))
+    for name in ("position_m", "orientation_deg"):
+        errors[name] = [factor * error for error in errors[name]]
+    both = ErrorScale(trial.model_copy(update={"photographs": Poses(**errors)}))
+    alone = np.array(ErrorScale(trial).stated(Spread(0.01, 0.1)))
+    np.testing.assert_allclose(both.stated(Spread(0.01, 0.1)), widened * alone)
+
+
+def test_photographs_are_added_with_the_spreads_that_their_radii_come_from(copied):
+    """Radii of the trial's frames, of poses that are all off by twice their 95 % radius."""
+    folder = copied / "map"
+    rng = np.random.default_rng(6)
+    spreads = [Spread(*pair) for pair in rng.uniform(0.01, 1.0, (FEWEST, 2))]
+    before = read_scale(folder)
+    stated = np.array([before.stated(spread) for spread in spreads])
+    add_photographs(folder, 2 * stated[:, 1], 2 * stated[:, 3], stated)
+    after = np.array([read_scale(folder).stated(spread) for spread in spreads])
+    np.testing.assert_allclose(after[:, [1, 3]], 2 * stated[:, [1, 3]])
+    add_photographs(folder, np.zeros(0), np.zeros(0), np.zeros((0, 4)))
+    np.testing.assert_allclose([read_scale(folder).stated(spread) for spread in spreads], after)
 
 
 def test_halves_of_a_trial_judge_each_other():
