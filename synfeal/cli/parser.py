@@ -48,7 +48,7 @@ OWN_COMMANDS: tuple[Command, ...] = (
 ENTRY_POINTS = "synfeal.commands"
 # Where commands come from that pages name and an installation may lack.
 DISTRIBUTIONS = {
-    "synfeal-baselines": ("build", "train", "map", "localize"),
+    "synfeal-baselines": ("build", "train", "map", "localize", "serve"),
     "synfeal-reproduction": ("cost", "profile", "run", "compare"),
 }
 
