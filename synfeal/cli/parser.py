@@ -7,6 +7,7 @@ import logging
 import sys
 from collections.abc import Sequence
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any, NoReturn
 
 from synfeal import __version__
@@ -64,6 +65,13 @@ def all_commands() -> tuple[Command, ...]:
     return (*OWN_COMMANDS, *added_commands())
 
 
+def _path(typed: str) -> Path:
+    """Convert an argument to a path; an empty one would stand for the working directory."""
+    if not typed:
+        raise argparse.ArgumentTypeError("is empty; is a variable of the shell not set?")
+    return Path(typed)
+
+
 def build_parser(commands: Sequence[Command]) -> argparse.ArgumentParser:
     """Build the parser of the ``synfeal`` command."""
     parser = OneLineParser(prog="synfeal", description=DESCRIPTION)
@@ -77,7 +85,8 @@ def build_parser(commands: Sequence[Command]) -> argparse.ArgumentParser:
             epilog=f"example: {command.example}",
         )
         for flag, details in command.options:
-            added.add_argument(flag, **details)
+            kind = details.get("type")
+            added.add_argument(flag, **details | ({"type": _path} if kind is Path else {}))
         added.set_defaults(action=command, usage=added)
     return parser
 

@@ -437,6 +437,12 @@ def _line_format(
 ) -> LineFormat:
     """Find the format of the first line (its number, its columns)."""
     line, row = first
+    if ";" in row[0]:
+        raise InputError(
+            path,
+            f"line {line} has semicolons between its columns",
+            "save it with commas there, and points in numbers",
+        )
     if file_format is not None:
         told = LINE_FORMATS[file_format]
         columns = told.n_numbers + (told.frame_key == "name")

@@ -29,6 +29,8 @@ COMMANDS = (
     ("export set --out new", "--to"),
     ("compare set", "RESULTS_B"),
     # collect: numbers and angles
+    ("collect room.glb --frames 2 --out ''", "--out: is empty"),
+    ("evaluate set ''", "POSES: is empty"),
     (f"{COLLECT} --frames 2.5", "--frames"),
     (f"{COLLECT} --frames two", "--frames"),
     (f"{COLLECT} --frames", "--frames"),

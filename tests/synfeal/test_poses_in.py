@@ -85,3 +85,11 @@ def test_a_file_without_a_trajectory_is_refused(content, said, tmp_path):
     (tmp_path / "poses.txt").write_bytes(content)
     with pytest.raises(InputError, match=rf"poses\.txt: .*{said}"):
         read_trajectory(tmp_path / "poses.txt")
+
+
+def test_a_spreadsheet_of_another_country_is_told_from_other_text(tmp_path):
+    """Its columns end in semicolons, and its numbers have commas."""
+    path = tmp_path / "poses.csv"
+    path.write_text("image;tx;ty;tz;qw;qx;qy;qz\na.png;0,5;1,25;2,0;1,0;0,0;0,0;0,0\n")
+    with pytest.raises(InputError, match=r"poses\.csv: line 1 has semicolons between its columns"):
+        read_pose_list(path)
