@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import uvicorn
 
 from baselines.serving.app import build_app
@@ -19,6 +21,8 @@ def server_of(place: ServedPlace, job: ServeJob) -> uvicorn.Server:
         place: The place, open.
         job: The settings.
     """
+    # It warns of every form that cannot be read, of which whoever sent it is told.
+    logging.getLogger("python_multipart").setLevel(logging.ERROR)
     config = uvicorn.Config(
         build_app(place, job),
         log_config=None,
