@@ -18,10 +18,15 @@ from typing import NamedTuple
 import pandas as pd
 
 from reproduction.claims.rules import frozen_rules
-from reproduction.claims.verdicts import GROUPS, MEANINGS, Claim, Verdict, published_claims
+from reproduction.claims.verdicts import GROUPS, Claim, Verdict, published_claims
 from reproduction.plan.plan import planned_cpu_s
 from reproduction.report.publish import PUBLISHED
-from reproduction.report.published_claims import published_runs, read_published, rules_of
+from reproduction.report.published_claims import (
+    SHOWN_MEANINGS,
+    published_runs,
+    read_published,
+    rules_of,
+)
 from reproduction.runs.results import read_result
 from reproduction.tables.sheet import markdown_table
 
@@ -178,7 +183,7 @@ def fresh_answer(published: Path = PUBLISHED) -> str:
     judged = judged_fresh(published)
     if not judged:
         return NONE_YET
-    titles = {str(verdict): f"**{verdict}** ({text})" for verdict, text in MEANINGS.items()}
+    titles = {str(verdict): f"**{verdict}** ({text})" for verdict, text in SHOWN_MEANINGS.items()}
     groups: dict[str, list[str]] = {name: [] for name in (*titles, CONTRADICTED)}
     for own in judged.values():
         groups[_outcome(own)].append(f"    - {own[0].claim.statement} ({_runs_behind(own)})")

@@ -16,12 +16,16 @@ from typing import Literal
 from reproduction.claims.rules import frozen_rules
 from reproduction.claims.table import verdict_counts
 from reproduction.claims.untrained import few_verdict
-from reproduction.claims.verdicts import GROUPS, Verdict
+from reproduction.claims.verdicts import GROUPS, MEANINGS, Verdict
 from reproduction.report.intervals import Interval
 from reproduction.tables.assistance import PUBLISHED_ASSISTED, PUBLISHED_SCENE, TOTAL
 from reproduction.tables.assistance import SCHEMA as ASSISTANCE
 from synfeal.records.tables import read_frame, read_records, rows_of
 
+# The frozen words for a smaller effect say that it may be none, also where its limits exclude none.
+SHOWN_MEANINGS = MEANINGS | {
+    Verdict.LESS: "certainly smaller than printed; the limits tell whether there is any"
+}
 # Of files without a column ``rules``.
 BEFORE_FREEZE = "2026-11-22g"
 Row = Mapping[str, str]

@@ -13,9 +13,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reproduction.claims.table import COLUMNS, verdict_counts
-from reproduction.claims.verdicts import GROUPS, MEANINGS, Verdict
+from reproduction.claims.verdicts import GROUPS, Verdict
 from reproduction.design.experiments import FROM_SCRATCH
 from reproduction.design.side_tables import SIDE_TABLES
+from reproduction.report.published_claims import SHOWN_MEANINGS
 from reproduction.tables.columns import SCORES, Column, SideLayout, cells_of
 from reproduction.tables.layouts import CHANGE
 from reproduction.tables.sheet import PAPER, Line, Value, footnotes
@@ -167,7 +168,7 @@ def verdict_table(claims: Claims) -> Markup:
         groups=GROUPS,
         verdicts=[verdict for verdict in BADGES if verdict in found],
         counts=counts,
-        meanings=MEANINGS,
+        meanings=SHOWN_MEANINGS,
     )
 
 
