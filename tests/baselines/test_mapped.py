@@ -165,7 +165,8 @@ def test_a_wrong_focal_length_is_seen(place, tmp_path, caplog, factor):
 
 def test_the_right_focal_length_is_not_doubted(place, tmp_path, caplog):
     localized(place, place / "photos", tmp_path / "poses.csv")
-    assert not caplog.records
+    # Of 20 frames no map can state an error, which is said.
+    assert [record.msg for record in caplog.records if "state no error" not in record.msg] == []
 
 
 def test_exif_tells_the_focal_length(place, tmp_path):
@@ -233,7 +234,12 @@ def test_the_same_frames_make_the_same_map(place, tmp_path):
     found, expected = tree_of(tmp_path / "map"), tree_of(place / "map")
     for files in (found, expected):
         del files["map.json"]  # has the time
+        del files["trial.json"]  # names map.json by its hash
     assert found == expected
+    trials = [json.loads((folder / "map/trial.json").read_text()) for folder in (tmp_path, place)]
+    for trial in trials:
+        del trial["map_sha256"]
+    assert trials[0] == trials[1]
 
 
 def test_a_map_is_plain_files_with_their_origin(place):

@@ -15,7 +15,7 @@ from PIL import Image
 from baselines.references.confidence import NO_SUPPORT
 from baselines.references.mapped import read_map
 from baselines.references.photographs import Answer, Finder, Photograph
-from baselines.references.redrawn import Redrawn, _mesh_from_map, read_redrawn, without_light
+from baselines.references.redrawn import Redrawn, mesh_from_map, read_redrawn, without_light
 from synfeal.camera.calibration import Calibration
 from synfeal.cli import main
 from synfeal.config.dataset import CameraConfig, RenderConfig
@@ -298,7 +298,7 @@ def scan_file(folder, sequence_from_mesh):
 
 def test_the_worlds_of_map_and_scan_meet_in_that_of_their_sequence(place, tmp_path):
     shown = replace(read_map(place / "map"), sequence_from_world=SEQUENCE_FROM_MAP)
-    motion = _mesh_from_map(shown, scan_file(tmp_path, SEQUENCE_FROM_MESH))
+    motion = mesh_from_map(shown, scan_file(tmp_path, SEQUENCE_FROM_MESH))
     # (1, 2, 3) of the map is (1, -3, 2 + 5) of the sequence, and that (-3 - 2, 1 - 1, 7 - 3) of the
     # mesh: x and y are turned back, (x, y) = (y' - 2, 1 - x').
     np.testing.assert_allclose(motion @ [1, 2, 3, 1], [-5, 0, 4, 1], atol=1e-12)
@@ -312,10 +312,10 @@ def test_a_mesh_or_a_map_of_no_sequence_is_in_the_world_of_the_other(place, tmp_
     shown = read_map(place / "map")
     assert shown.sequence_from_world is None
     np.testing.assert_array_equal(
-        _mesh_from_map(shown, scan_file(tmp_path, SEQUENCE_FROM_MESH)), np.eye(4)
+        mesh_from_map(shown, scan_file(tmp_path, SEQUENCE_FROM_MESH)), np.eye(4)
     )
     of_sequence = replace(shown, sequence_from_world=SEQUENCE_FROM_MAP)
-    np.testing.assert_array_equal(_mesh_from_map(of_sequence, place / "room.glb"), np.eye(4))
+    np.testing.assert_array_equal(mesh_from_map(of_sequence, place / "room.glb"), np.eye(4))
 
 
 def test_a_scan_that_stands_elsewhere_is_found_by_its_record(place, tmp_path, camera):
