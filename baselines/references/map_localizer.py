@@ -33,7 +33,7 @@ DECIMALS = 6  # micrometres
 
 
 class Located(NamedTuple):
-    """What is known of where a photograph was taken.
+    """Answer of a localizer about one photograph.
 
     Attributes:
         status: Whether it was localized.

@@ -34,7 +34,6 @@ from baselines.references.photographs import Finder
 from baselines.references.pose_covariance import Spread
 from baselines.training.photometric import PhotometricRandomisation
 from synfeal.camera.calibration import Calibration
-from synfeal.config.dataset import CameraConfig
 from synfeal.config.effects import NoiseConfig
 from synfeal.config.load import describe
 from synfeal.config.photometric import BlurConfig, PhotometricConfig
@@ -270,7 +269,7 @@ def try_map(place: StructureMap, frames: MapFrames, map_sha256: str, seed: int) 
     torch.set_num_threads(1)
     finder = Finder(place, seed)
     randomise = PhotometricRandomisation(PHOTOGRAPHIC, seed)
-    calibration = _calibration_of(place.camera)
+    calibration = Calibration.of_camera(place.camera)
     every = np.arange(len(place))
     found: list[tuple[float, ...]] = []
     tried = np.unique(np.linspace(0, len(place) - 1, TRIED).round().astype(np.int64))
@@ -314,16 +313,3 @@ def photographed(
     shown = randomise(torch.from_numpy(square).permute(2, 0, 1)[None])[0]
     levels = shown[:, :height, :width].permute(1, 2, 0).round().to(torch.uint8)
     return np.ascontiguousarray(levels.numpy())
-
-
-def _calibration_of(camera: CameraConfig) -> Calibration:
-    fx, fy, cx, cy = camera.intrinsics
-    return Calibration(
-        width=camera.width,
-        height=camera.height,
-        fx=fx,
-        fy=fy,
-        cx=cx,
-        cy=cy,
-        distortion=camera.distortion,
-    )

@@ -1,4 +1,4 @@
-"""What the server says, as JSON.
+"""Answers of the server, as JSON.
 
 A pose is given twice: plainly, and as an OGC GeoPose (OGC 21-056r11, GeoPose 1.0), whose form
 *Advanced* names the frame that its quaternion is relative to. A place that was scanned indoors has
@@ -74,7 +74,7 @@ class Camera(BaseModel):
 
 
 class Answer(BaseModel):
-    """Where a photograph was taken."""
+    """Answer about one photograph: its pose, or that it has none."""
 
     model_config = ConfigDict(extra="allow")  # further columns of synfeal localize
 

@@ -15,7 +15,7 @@ MOST_PORT = 65535
 
 @dataclass(frozen=True)
 class ServeJob:
-    """What is served, where, and how much of it at once.
+    """Settings of a server: its place, its address, and how much it takes at once.
 
     Attributes:
         place: Folder of a place or of a map.

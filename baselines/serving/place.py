@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 
 class Found(NamedTuple):
-    """Where a photograph was taken.
+    """Answer of a place about one photograph.
 
     Attributes:
         located: Its pose, or why there is none.

@@ -1,4 +1,4 @@
-"""What a place looks like through the camera of a photograph."""
+"""Drawing of a place through the camera of a photograph."""
 
 from __future__ import annotations
 

@@ -293,8 +293,8 @@ def shared_errors_stay(root: Path) -> Finding | None:
         "the truth",
         SHAPE_CHANGES if _has_by_frame(root) else SHAPES_ROWS,
         f"Labels {_noise(off_in_all_shapes(root))} off change the networks' orientation error by"
-        f" {_change(own.value)} if every frame has its own error, by {_change(space.value)} if"
-        " all share one smooth distortion of space.",
+        f" {change_text(own.value)} if every frame has its own error, by"
+        f" {change_text(space.value)} if all share one smooth distortion of space.",
     )
 
 
@@ -320,15 +320,15 @@ def noise_is_mostly_the_yardsticks(root: Path) -> Finding | None:
         "Most of what noise in the labels seems to do is done by the noise of the test labels.",
         f"Labels that are {_noise(moved_by(root))} off change the errors against test labels with"
         f" the same noise, averaged over the five networks, by {percent(seen[0])} and"
-        f" {percent(seen[1])} (in the paper: {' and '.join(map(_change, printed))}). Scored"
+        f" {percent(seen[1])} (in the paper: {' and '.join(map(change_text, printed))}). Scored"
         f" against such labels, networks that learnt from exact ones seem worse, too, by"
-        f" {' and '.join(map(_change, alone))}. Against the true poses the changes are"
+        f" {' and '.join(map(change_text, alone))}. Against the true poses the changes are"
         f" {percent(harm[0])} and {percent(harm[1])}.",
         "labels or truth, as each sentence says",
         "table3_inconsistencies",
         f"Noise in all labels changes the networks' orientation error by"
-        f" {_change(seen[1].value)} against the noisy test labels and by"
-        f" {_change(harm[1].value)} against the true poses: most of it is in the test labels.",
+        f" {change_text(seen[1].value)} against the noisy test labels and by"
+        f" {change_text(harm[1].value)} against the true poses: most of it is in the test labels.",
         _told_by(root, asked),
     )
 
@@ -391,13 +391,13 @@ def more_frames_help(root: Path) -> Finding | None:
         f"From {SMALL} to {LARGE} frames of the Large Room the position error changes by"
         f" {percent(position)} and the orientation error by {percent(orientation)}"
         f" {_printed(few, many)}. But runs on larger sets are also shown more images, and doubling"
-        f" the images alone changes the errors at {SMALL} by {_change(images_m.value)} and"
-        f" {_change(images_deg.value)}, which is {low} to {high} % of the effect of size. No"
+        f" the images alone changes the errors at {SMALL} by {change_text(images_m.value)} and"
+        f" {change_text(images_deg.value)}, which is {low} to {high} % of the effect of size. No"
         f" {SMALL} run was shown as many images as the {LARGE} runs.",
         "labels and truth alike",
         "table4_size",
-        f"From {SMALL} to {LARGE} frames the position error changes by {_change(position.value)},"
-        " part of it by longer training.",
+        f"From {SMALL} to {LARGE} frames the position error changes by"
+        f" {change_text(position.value)}, part of it by longer training.",
     )
 
 
@@ -435,8 +435,9 @@ def frames_and_images(root: Path, controls: Path) -> Finding | None:
         f" {percent(images[0])} and {percent(images[1])}.",
         "labels and truth alike",
         "table4_size",
-        f"From {SMALL} to {LARGE} frames the position error changes by {_change(whole[0].value)},"
-        f" and by {_change(frames[0].value)} where no more images are shown.",
+        f"From {SMALL} to {LARGE} frames the position error changes by"
+        f" {change_text(whole[0].value)}, and by {change_text(frames[0].value)} where no more"
+        " images are shown.",
         controls.name,
     )
 
@@ -485,7 +486,7 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
     if single is None or not all(change.holds(1.0) for change in shown):
         return None
     texts = [
-        f"{' and '.join(_change(change.value) for change in both)} ({title})"
+        f"{' and '.join(change_text(change.value) for change in both)} ({title})"
         for title, both in changes.items()
     ]
     sfm = cells[cells.labels == "sfm"]
@@ -674,7 +675,7 @@ def _printed(before: pd.DataFrame, after: pd.DataFrame) -> str:
     texts = []
     for measure in ("position_m", "orientation_deg"):
         ratio = both[f"published_{measure}_new"] / both[f"published_{measure}_old"]
-        texts.append(_change(float(np.exp(np.log(ratio).mean()))))
+        texts.append(change_text(float(np.exp(np.log(ratio).mean()))))
     return f"(in the paper: {texts[0]} and {texts[1]})"
 
 
@@ -706,7 +707,7 @@ def _noise(noise: tuple[float, float]) -> str:
     return f"{100 * noise[0]:.0f} cm and {noise[1]:.0f}°"
 
 
-def _change(factor: float) -> str:
+def change_text(factor: float) -> str:
     """Format a factor as a change in percent."""
     change = round(100 * (factor - 1))  # an integer has no minus zero
     return f"{change:+d} %".replace("-", "−") if change else "0 %"
@@ -714,5 +715,5 @@ def _change(factor: float) -> str:
 
 def percent(interval: Interval) -> str:
     """Format a factor with its limits as a change in percent."""
-    value, low, high = map(_change, interval)
+    value, low, high = map(change_text, interval)
     return f"{value} ({low.removesuffix(' %')} to {high})"

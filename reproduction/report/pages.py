@@ -24,6 +24,7 @@ from reproduction.claims.table import claims_markdown
 from reproduction.real.findings import real_findings, real_headline, real_short, real_table
 from reproduction.report.effects_figure import effects_digest, effects_picture
 from reproduction.report.findings import (
+    CONTROLS,
     MEASURES,
     can_tell,
     noise_changes,
@@ -313,7 +314,7 @@ def stale(check: bool) -> list[Path]:
     drawn = panels(shown) if can_tell(shown) else []
     if drawn and not is_drawn_from(FIGURE, drawn):
         writers[FIGURE] = partial(write_findings_figure, drawn, FIGURE)
-    if (PUBLISHED / "controls").is_dir():
+    if (PUBLISHED / CONTROLS).is_dir():
         of_claims = effects(shown)
         if not shows(EFFECTS_FIGURE, effects_digest(of_claims)):
             content = effects_picture(of_claims)

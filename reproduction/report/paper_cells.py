@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -25,19 +25,6 @@ SIZES = "table4_size"
 # test set, as the paper's are.
 OURS = {"position": "position_rms_m", "orientation": "orientation_deg"}
 PRINTED = {"position": "published_position_m", "orientation": "published_orientation_deg"}
-
-
-class Order(NamedTuple):
-    """How like the printed order of networks is to the order found.
-
-    Attributes:
-        within_rows: Spearman's rank correlation of ours with print over the networks of a row of
-            Table 4, mean over its rows.
-        within_networks: The same over the rows, mean over the networks.
-    """
-
-    within_rows: float
-    within_networks: float
 
 
 def paper_cells(root: Path) -> pd.DataFrame:
@@ -87,19 +74,21 @@ def ratios(cells: pd.DataFrame, quantity: str) -> dict[str, float]:
     return {model: math.exp(means[model]) for model in MODELS if model in means}
 
 
-def order_of_networks(cells: pd.DataFrame, quantity: str) -> Order:
-    """Correlate the ranks of ours and print in Table 4, within rows and within networks."""
+def rank_correlations(
+    cells: pd.DataFrame, quantity: str, within: Literal["row", "model"]
+) -> list[float]:
+    """Correlate the ranks of ours and print in Table 4 (Spearman).
+
+    Args:
+        cells: As :func:`paper_cells` returns them.
+        quantity: ``position`` or ``orientation``.
+        within: Ranks are those of the networks of a ``row``, or those of the rows of a ``model``.
+
+    Returns:
+        A correlation for each row, or for each network.
+    """
     sizes = cells[(cells.table == SIZES) & (cells.quantity == quantity)]
-    return Order(*(float(np.mean(_correlations(sizes, key))) for key in ("row", "model")))
-
-
-def row_orders(cells: pd.DataFrame, quantity: str) -> list[float]:
-    """List the rank correlation among the networks of each row of Table 4."""
-    return _correlations(cells[(cells.table == SIZES) & (cells.quantity == quantity)], "row")
-
-
-def _correlations(cells: pd.DataFrame, key: str) -> list[float]:
     return [
         float(spearmanr(group.printed, group.ours)[0])
-        for _, group in cells.groupby(key, sort=False)
+        for _, group in sizes.groupby(within, sort=False)
     ]

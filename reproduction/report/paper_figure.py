@@ -47,7 +47,7 @@ def paper_figure(cells: pd.DataFrame) -> Figure:
     handles, models = all_axes[0].get_legend_handles_labels()
     figure.legend(
         handles,
-        [f"{TITLES[model]}\n× {times[0][model]:.2f}, × {times[1][model]:.2f}" for model in models],
+        [_title(model, times) for model in models],
         loc="outside lower center",
         ncols=len(models),
         handlelength=1.0,

@@ -1,22 +1,30 @@
-"""What of the paper was reproduced and what was not: five lines that the read-me opens with."""
+"""Five lines that the read-me opens with: what of the paper was reproduced, and what was not."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
+from statistics import mean
 from typing import Literal, NamedTuple
 
-from reproduction.report.findings import paired_changes, percent, read_table, sfm_training_labels
+from reproduction.report.findings import (
+    CONTROLS,
+    LABELS,
+    change_text,
+    paired_changes,
+    percent,
+    read_table,
+    sfm_training_labels,
+)
 from reproduction.report.intervals import Interval
-from reproduction.report.paper_cells import SIZES, order_of_networks, paper_cells, row_orders
+from reproduction.report.paper_cells import SIZES, paper_cells, rank_correlations
 from reproduction.report.published_claims import read_published
 from synfeal.errors import InputError
 
 CHANGES = re.compile(r"p ([+-]?\d+) %, o ([+-]?\d+) %")
-# Published runs that the lines are told by: of those with fresh seeds and test frames of whole
-# paths the ones with most training runs.
-ROOM, SANCTUARY, LABELS = "controls", "more_sanctuary", "labels"
+# Lines are told by published runs with fresh seeds whose test frames are whole paths: by this one,
+# and by those of the findings on sizes and on labels.
+MORE_SANCTUARY = "more_sanctuary"
 QUANTITIES = ("position", "orientation")
 # Claims whose changes, like the paper's, are shares of the error with noise, so that none is over
 # 100 %. Here they are told over the error without.
@@ -44,7 +52,7 @@ class Effect(NamedTuple):
 
     def __str__(self) -> str:
         """Format both changes with limits, and the paper's."""
-        paper = f" (paper: {', '.join(map(_change, self.paper))})" if self.paper else ""
+        paper = f" (paper: {', '.join(map(change_text, self.paper))})" if self.paper else ""
         return (
             f"{percent(self.ours[0])} in position and {percent(self.ours[1])} in orientation{paper}"
         )
@@ -59,19 +67,17 @@ def effects(root: Path) -> list[Effect]:
     Raises:
         InputError: A run that one is told by is not published, or does not judge the claim.
     """
-    asked: tuple[tuple[str, str, str, Literal["labels", "true"]], ...] = (
-        ("Large Room, 6k to 80k frames, mean of five networks", ROOM, "C7", "true"),
-        ("Sanctuary, 6k to 95k frames, mean of five networks", SANCTUARY, "C8", "true"),
-        ("noise of 0.30 m and 20° in all labels, PoseNet2", LABELS, "C6", "labels"),
-        ("the same, against the true poses", LABELS, "C6", "true"),
-        ("simulator's labels instead of SfM's, PoseNet2", LABELS, "C2", "true"),
+    room = _effect("Large Room, 6k to 80k frames, mean of five networks", root, CONTROLS, "C7")
+    sanctuary = _effect(
+        "Sanctuary, 6k to 95k frames, mean of five networks", root, MORE_SANCTUARY, "C8"
     )
-    found = [_effect(name, root.with_name(run), claim, score) for name, run, claim, score in asked]
-    # Against true poses the paper has no score of noisy labels; without noise both are the same.
-    return [
-        one._replace(paper=None) if (one.claim, one.against) == ("C6", "true") else one
-        for one in found
-    ]
+    noise = _effect(
+        "noise of 0.30 m and 20° in all labels, PoseNet2", root, LABELS, "C6", against="labels"
+    )
+    # The paper has no score of noisy labels against true poses.
+    harm = _effect("the same, against the true poses", root, LABELS, "C6")._replace(paper=None)
+    labels = _effect("simulator's labels instead of SfM's, PoseNet2", root, LABELS, "C2")
+    return [room, sanctuary, noise, harm, labels]
 
 
 def reproduced(root: Path) -> str:
@@ -85,15 +91,15 @@ def reproduced(root: Path) -> str:
     """
     if not (root / "tables" / f"{SIZES}.csv").is_file():
         raise InputError(root, "has no Table 4", "publish again")
-    found = effects(root)
-    lines: tuple[Callable[[], str], ...] = (
-        lambda: _size(*found[:2]),
-        lambda: _noise(*found[2:4]),
-        lambda: _networks(root),
-        lambda: _labels(root, found[4]),
-        lambda: _start(root),
+    room, sanctuary, noise, harm, labels = effects(root)
+    lines = (
+        _size(room, sanctuary),
+        _noise(noise, harm),
+        _networks(root),
+        _labels(root, labels),
+        _start(root),
     )
-    return "\n".join(f"- {line()}" for line in lines)
+    return "\n".join(f"- {line}" for line in lines)
 
 
 def _size(room: Effect, sanctuary: Effect) -> str:
@@ -113,14 +119,13 @@ def _noise(seen: Effect, harm: Effect) -> str:
 
 def _networks(root: Path) -> str:
     cells = paper_cells(root)
-    orders = {quantity: order_of_networks(cells, quantity).within_rows for quantity in QUANTITIES}
-    against = [order for order in row_orders(cells, "position") if order < 0]
-    rows = len(row_orders(cells, "position"))
-    position, orientation = (_signed(order) for order in orders.values())
+    position, orientation = (rank_correlations(cells, quantity, "row") for quantity in QUANTITIES)
+    against = sum(order < 0 for order in position)
     return (
         "**Not reproduced: which network is best.** Rank correlation with the paper among the five,"
-        f" mean over the {rows} rows of Table 4: {position} in position (negative in {len(against)}"
-        f" rows), {orientation} in orientation. Our networks are small and shown little."
+        f" mean over the {len(position)} rows of Table 4: {_signed(mean(position))} in position"
+        f" (negative in {against} rows), {_signed(mean(orientation))} in orientation."
+        " Our networks are small and shown little."
     )
 
 
@@ -139,24 +144,24 @@ def _labels(root: Path, effect: Effect) -> str:
 
 
 def _start(root: Path) -> str:
-    row = _claim(root.with_name(ROOM), "C10")
-    ends = {
-        size: re.search(rf"{size}: p ([+-][\d.]+) % to ([+-][\d.]+) %", row["interval_true"])
-        for size in ("6k", "20k")
-    }
-    texts = [
-        f"{_change(1 + float(found[1]) / 100)} to {_change(1 + float(found[2]) / 100)} at {size}"
-        for size, found in ends.items()
-        if found
-    ]
+    row = _claim(root.with_name(CONTROLS), "C10")
+    texts = []
+    for size in ("6k", "20k"):
+        limits = rf"{size}: p ([+-][\d.]+) % to ([+-][\d.]+) %"
+        if found := re.search(limits, row["interval_true"]):
+            low, high = (change_text(1 + float(end) / 100) for end in found.groups())
+            texts.append(f"{low} to {high} at {size}")
     return (
         f"**Undecided: transfer learning.** {row['measured_true'].capitalize()} at 6k and 20k"
         f" frames (paper: 20 of 20); mean change in position, 95 % limits: {', '.join(texts)}."
     )
 
 
-def _effect(name: str, run: Path, claim: str, score: Literal["labels", "true"]) -> Effect:
-    ours = paired_changes(run, claim, score=score)
+def _effect(
+    name: str, root: Path, profile: str, claim: str, against: Literal["labels", "true"] = "true"
+) -> Effect:
+    run = root.with_name(profile)
+    ours = paired_changes(run, claim, score=against)
     found = CHANGES.search(_claim(run, claim)["published"])
     if ours is None or found is None:
         raise InputError(run, f"does not judge {claim}", "publish again")
@@ -164,7 +169,7 @@ def _effect(name: str, run: Path, claim: str, score: Literal["labels", "true"]) 
     if claim in SHARES_OF_THE_LARGER:
         ours = over_smaller(ours[0]), over_smaller(ours[1])
         position, orientation = 1 / (2 - position), 1 / (2 - orientation)
-    return Effect(name, run.name, claim, score, ours, (position, orientation))
+    return Effect(name, profile, claim, against, ours, (position, orientation))
 
 
 def over_smaller(share: Interval) -> Interval:
@@ -181,12 +186,6 @@ def _claim(run: Path, claim: str) -> dict[str, str]:
     if claim not in rows:
         raise InputError(run, f"does not judge {claim}", "publish again")
     return rows[claim]
-
-
-def _change(factor: float) -> str:
-    """Format a factor as a change in percent."""
-    change = round(100 * (factor - 1))
-    return f"{change:+d} %".replace("-", "−") if change else "0 %"
 
 
 def _signed(number: float) -> str:

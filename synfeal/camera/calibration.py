@@ -20,6 +20,7 @@ from typing import Any, Literal
 import yaml
 
 from synfeal.camera.programs import as_opencv
+from synfeal.camera.projection import Camera
 from synfeal.errors import InputError, why
 from synfeal.records.files import (
     MOST_TEXT_BYTES,
@@ -111,6 +112,11 @@ class Calibration:
                     f"{name}: the principal point {value:g} lies outside the image of"
                     f" {self.width}x{self.height}; are both of the same calibration?"
                 )
+
+    @classmethod
+    def of_camera(cls, camera: Camera) -> Calibration:
+        """Return the calibration of a perspective camera."""
+        return cls(camera.width, camera.height, *camera.intrinsics, camera.distortion)
 
     def scaled(self, width: int | None, height: int | None) -> Calibration:
         """Return the same lens for images that are resized to another size in pixels.

@@ -24,7 +24,7 @@ LEVELS = (0.5, SD_LEVEL, 0.8, 0.9, WIDE_LEVEL, 0.99)
 
 
 class Coverage(NamedTuple):
-    """How stated radii of one level fit the errors.
+    """Fit of the stated radii of one level to the errors.
 
     Attributes:
         level: Share of the errors that they are said to hold.

@@ -156,10 +156,8 @@ def resized(camera: CameraConfig, width: int | None, height: int | None) -> Came
             f"its camera is {camera.projection}",
             "give a calibration, or projection and field of view",
         )
-    fx, fy, cx, cy = camera.intrinsics
-    lens = Calibration(camera.width, camera.height, fx, fy, cx, cy, camera.distortion)
     try:
-        small = lens.scaled(width, height)
+        small = Calibration.of_camera(camera).scaled(width, height)
     except ValueError as error:
         raise InputError(Argument("width"), f"the camera to be like {error}") from error
     return camera.model_copy(

@@ -9,10 +9,11 @@ import pytest
 
 from reproduction.report.effects_figure import effects_digest, effects_picture
 from reproduction.report.intervals import Interval
-from reproduction.report.paper_cells import order_of_networks, paper_cells, ratios, row_orders
+from reproduction.report.paper_cells import paper_cells, rank_correlations, ratios
 from reproduction.report.paper_figure import cells_digest, paper_figure, paper_picture
 from reproduction.report.reproduced import effects, over_smaller, reproduced
 from reproduction.report.stamped import shows, write_stamped
+from reproduction.tables.layouts import TITLES
 from synfeal.errors import InputError
 
 REPOSITORY = Path(__file__).parents[2]
@@ -75,9 +76,9 @@ def correlation(first, second):
 
 @pytest.mark.parametrize("quantity", [*OURS])
 def test_ranks_within_rows_and_within_networks(cells, quantity):
-    found = order_of_networks(cells, quantity)
-    parts = {("scene", "size"): found.within_rows, ("model",): found.within_networks}
-    for keys, printed in parts.items():
+    parts = {("scene", "size"): "row", ("model",): "model"}
+    for keys, within in parts.items():
+        found = rank_correlations(cells, quantity, within)
         groups = {}
         for row in rows("table4_size"):
             groups.setdefault(tuple(row[key] for key in keys), []).append(row)
@@ -88,23 +89,24 @@ def test_ranks_within_rows_and_within_networks(cells, quantity):
             )
             for group in groups.values()
         ]
-        assert printed == pytest.approx(sum(expected) / len(expected), abs=1e-9)
+        assert found == pytest.approx(expected, abs=1e-9)
 
 
 def test_orders_that_agree_and_orders_that_are_reversed(cells):
     sizes = cells[(cells.table == "table4_size") & (cells.quantity == "position")]
     same = sizes.assign(ours=3 * sizes.printed)
-    assert order_of_networks(same, "position") == pytest.approx((1, 1))
-    reversed_order = order_of_networks(sizes.assign(ours=1 / sizes.printed), "position")
-    assert reversed_order == pytest.approx((-1, -1))
+    reverse = sizes.assign(ours=1 / sizes.printed)
+    for within, count in (("row", 8), ("model", 5)):
+        assert rank_correlations(same, "position", within) == pytest.approx([1] * count)
+        assert rank_correlations(reverse, "position", within) == pytest.approx([-1] * count)
     assert list(ratios(same, "position").values()) == pytest.approx([3] * 5)
 
 
 def test_the_line_on_networks_says_what_the_cells_say(cells):
     line = reproduced(NIGHT).splitlines()[2].replace("−", "-")
-    within = [order_of_networks(cells, quantity).within_rows for quantity in OURS]
+    orders, turns = (rank_correlations(cells, quantity, "row") for quantity in OURS)
+    within = [sum(values) / len(values) for values in (orders, turns)]
     assert [float(n) for n in re.findall(r"[+-]\d\.\d\d", line)] == [round(n, 2) for n in within]
-    orders = row_orders(cells, "position")
     assert f"over the {len(orders)} rows" in line
     assert f"negative in {sum(order < 0 for order in orders)} rows" in line
 
@@ -176,6 +178,13 @@ def test_the_figure_has_a_mark_for_every_cell_and_knows_what_it_shows(cells, tmp
     moved = cells.assign(ours=cells.ours * 1.001)
     assert not shows(out, cells_digest(moved))
     assert not shows(tmp_path / "none.png", cells_digest(cells))
+
+
+def test_a_run_without_table_4_has_a_figure_without_ratios(cells):
+    figure = paper_figure(cells[cells.table != "table4_size"])
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [f"{t}\n" for t in TITLES.values()]
+    assert "×" in paper_figure(cells).legends[0].get_texts()[0].get_text()
 
 
 def test_a_run_without_these_tables_has_no_cells(tmp_path):
