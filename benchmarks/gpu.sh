@@ -9,15 +9,17 @@
 # Frames are those of `night` (Large Room, 6k), drawn here. Structure's errors on the same data set
 # are in results/published/night/tables/references.csv. Stages that have no time left are cut, and
 # what they had measured is kept.
-# PYTHON names another interpreter. SCALE=toy DEVICE=cpu PROFILE=FILE tries it without a GPU.
+# PYTHON names another interpreter. PLANNED=OUT/labels, written by `python -m benchmarks.gpu_frames
+# plan OUT` elsewhere, serves machines without Open3D. SCALE=toy DEVICE=cpu PROFILE=FILE tries it without a GPU.
 set -uo pipefail
 out=${1:?name a directory to write to}
 python=${PYTHON:-python}
 device=${DEVICE:-cuda}
-most_s=460
+most_s=${MOST_S:-460}
 rates=(--most-seconds 150)
 data=(--profile "${PROFILE:-night}")
 small=()
+planned=(${PLANNED:+--labels "$(realpath "$PLANNED")"})
 large=(--models posenet posenet2 poselstm --width 1 --batch 45)
 if [ "${SCALE:-}" = toy ]; then
   rates=(--toy --seconds 0.2)
@@ -43,6 +45,7 @@ learn() { # NAME FRAMES OPTIONS...: errors_NAME.csv
 
 # The processor plans while the GPU is measured; the GPU draws when that is over.
 timeout "$(left 100)" "$python" -m benchmarks.gpu_frames plan "$out/data" "${data[@]}" \
+  "${planned[@]}" \
   >"$out/plan.log" 2>&1 &
 planning=$!
 timeout "$(left 200)" "$python" -m benchmarks.gpu --device "$device" --out "$out/rates.csv" \

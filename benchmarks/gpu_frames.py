@@ -4,6 +4,8 @@
     python -m benchmarks.gpu_frames draw OUT     # frames, by the GPU where its driver draws
 
 Nothing needs to be carried to that machine: 6,000 and 2,500 frames of 224 pixels would be 1.3 GB.
+Poses are planned with Open3D. Where a machine lacks it, ``plan OUT --labels DIR`` takes those that
+were planned on another one.
 The directory is laid out for :mod:`benchmarks.gpu_errors`: ``labels``, ``frames-small`` as the
 profile's networks see them, and ``frames-large`` of 224 pixels.
 """
@@ -13,6 +15,7 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
+import shutil
 import sys
 import time
 from collections.abc import Sequence
@@ -26,7 +29,7 @@ from synfeal.collection.prepare import prepare_scene
 from synfeal.config.dataset import CameraConfig
 from synfeal.dataset.packed import write_packed
 from synfeal.dataset.render_sequence import render_packed
-from synfeal.errors import exit_status
+from synfeal.errors import exit_status, read_as
 from synfeal.planning.plan import write_plan
 from synfeal.records.provenance import seed_of
 
@@ -68,23 +71,31 @@ class Source(NamedTuple):
         return {"small": small, "large": LARGE}
 
 
-def plan(source: Source, out: Path) -> None:
+def plan(source: Source, out: Path, labels: Path | None = None) -> None:
     """Make the mesh of the scene, and the poses of the frames.
 
     Args:
         source: Data set.
         out: Directory to write to.
+        labels: Directory of poses that were planned before; None plans them.
+
+    Raises:
+        InputError: There are no such poses.
     """
     config, scene = source.config, source.config.scenes[source.scene]
+    if labels is not None:
+        with read_as(labels, "poses planned before"):
+            shutil.copytree(labels, out / "labels", dirs_exist_ok=True)
     prepare_scene(
         name=source.scene,
         scene=scene,
-        collision_agreement=config.collection.collision_agreement,
+        # Only planning asks what a camera would run into.
+        collision_agreement=None if labels else config.collection.collision_agreement,
         seed=config.seed,
         out_mesh=out / "scene" / "mesh.glb",
         shade=config.render.shade,
     )
-    for split in SPLITS:
+    for split in SPLITS if labels is None else ():
         write_plan(
             collision=out / "scene" / "collision.ply",
             scene=scene,
@@ -147,6 +158,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.gpu_frames", description=__doc__)
     parser.add_argument("stage", choices=("plan", "draw"))
     parser.add_argument("out", type=Path, help="directory")
+    parser.add_argument("--labels", type=Path, help="poses planned before: of train and test.csv")
     parser.add_argument("--profile", default="night", help="name or file (night)")
     parser.add_argument("--scene", default="large_room", help="(large_room)")
     parser.add_argument("--size", default="6k", help="(6k)")
@@ -161,7 +173,7 @@ def run(options: argparse.Namespace) -> None:
     source = Source(read_profile(options.profile).config, options.scene, options.size)
     began = time.monotonic()
     if options.stage == "plan":
-        plan(source, options.out)
+        plan(source, options.out, options.labels)
     else:
         draw(source, options.out, options.processes)
     print(f"{options.stage}: {time.monotonic() - began:.0f} s")

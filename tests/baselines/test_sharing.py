@@ -34,8 +34,8 @@ def test_a_driver_that_tells_nothing_is_no_card(lines, tmp_path):
 
 
 def test_as_many_runs_share_a_card_as_its_time_and_its_memory_bear():
-    assert training_percent(8_500, SMALL, 64, H200_MB) == 25
-    assert training_percent(8_500, FULL, 45, H200_MB) == 25
+    assert training_percent(8_500, SMALL, 64, H200_MB) == 50
+    assert training_percent(8_500, FULL, 45, H200_MB) == 50
     for card in (GAMING_MB, 24_000.0, H200_MB):
         for frames in (8_500, 115_000):
             share = training_percent(frames, FULL, 45, card)

@@ -1,6 +1,7 @@
 """The captured training step beside the plain one, on a processor."""
 
 from contextlib import nullcontext
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -13,12 +14,19 @@ from baselines.training.data import BatchOrder, ImageStatistics, LabelledFrames
 from baselines.training.optimizer import Muon, Optimisation, Schedule, optimisation_of
 from baselines.training.photometric import PhotometricRandomisation
 from baselines.training.rotation import RandomRotation
-from baselines.training.step import WARM_UP_STEPS, CapturedStep, PlainStep, training_step
+from baselines.training.step import (
+    WARM_UP_STEPS,
+    CapturedStep,
+    CudaRecorder,
+    PlainStep,
+    training_step,
+)
 from synfeal.camera.projection import Intrinsics
 from synfeal.config.photometric import PhotometricConfig
 from tests.support.colored_frames import NETWORK, PX, read_split, statistics_of, write_split
 from tests.support.op_tape import OneDevice, TapeRecorder
 
+PROCESSOR = torch.device("cpu")
 BATCH = 4
 STEPS = 50
 SCHEDULE = Schedule(STEPS * BATCH, BATCH, learning_rate=2e-3, weight_decay=0.01, halve_every=0.2)
@@ -32,20 +40,27 @@ def frames(tmp_path_factory):
     return read_split(write_split(tmp_path_factory.mktemp("frames"), "train", 40, 0))
 
 
-def plain_step(frames, name, optimiser="muon"):
+def plain_step(frames, name, optimiser="muon", device=PROCESSOR):
     """A step of a new run that draws all that can be drawn."""
     torch.manual_seed(3)  # of dropout, too
     localizer = build_localizer(name, NETWORK, HYPER)
-    localizer.place_on(torch.device("cpu"))
+    localizer.place_on(device)
     return PlainStep(
         localizer=localizer.train(),
         frames=frames,
         statistics=statistics_of(frames),
         optimisation=optimisation_of(optimiser, localizer, SCHEDULE),
         precision="float32",
-        randomise=PhotometricRandomisation(PhotometricConfig(), 1),
-        augment=RandomRotation(CAMERA, PX, TURNS, 2),
+        randomise=PhotometricRandomisation(PhotometricConfig(), 1, device),
+        augment=RandomRotation(CAMERA, PX, TURNS, 2, device),
     )
+
+
+def placed(frames, device):
+    """Move frames to a device."""
+    tensors = {field.name: getattr(frames, field.name) for field in fields(frames)}
+    moved = {name: t.to(device) for name, t in tensors.items() if isinstance(t, torch.Tensor)}
+    return replace(frames, **moved)
 
 
 def rates_on_device(optimisation):
@@ -139,6 +154,26 @@ class NoGenerator:
 
     def manual_seed(self, seed):
         return None
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+@pytest.mark.parametrize("name", ["posenet", "poselstm", "hourglass", "posenet2resnet", "posenet2"])
+def test_a_gpu_learns_to_the_bit_alike_from_captured_and_plain_steps(frames, name, monkeypatch):
+    monkeypatch.setattr(torch.backends.cudnn, "benchmark", False)
+    monkeypatch.setattr(torch.backends.cudnn, "deterministic", True)
+    device = torch.device("cuda")
+    weights = []
+    for captured in (False, True):
+        step = plain_step(placed(frames, device), name, device=device)
+        recorder = CudaRecorder(device, step.generators)
+        taken = CapturedStep(step, recorder) if captured else step
+        torch.cuda.manual_seed_all(7)
+        order = BatchOrder(len(frames), BATCH, seed=4)
+        for _ in range(STEPS):
+            taken(order.next_batch().to(device))
+        weights.append(step.localizer.state_dict())
+    for key, value in weights[0].items():
+        assert torch.equal(weights[1][key], value), key
 
 
 def test_a_processor_takes_plain_steps(frames):
