@@ -319,11 +319,11 @@ def inspect(
     Raises:
         InputError: The mesh or capture cannot be used, or a capture is given what goes with a mesh.
     """
-    from synfeal.captures.formats import is_capture
+    from synfeal.captures.formats import may_be_capture
     from synfeal.inspection.captured import inspect_capture
     from synfeal.inspection.run import OUTPUTS, inspect_mesh
 
-    if format is not None or is_capture(Path(mesh)):
+    if format is not None or may_be_capture(Path(mesh)):
         for name, value in (("box", box), ("unit_m", unit_m)):
             if value:
                 raise InputError(

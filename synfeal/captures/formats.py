@@ -91,6 +91,11 @@ def is_capture(path: Path, besides: Collection[str] = ()) -> bool:
     return any(one.is_at(path) for one in capture_formats().values() if one.name not in besides)
 
 
+def may_be_capture(path: Path) -> bool:
+    """Tell whether a path that may be a mesh is a capture or, being a folder, no mesh."""
+    return path.is_dir() or is_capture(path)
+
+
 def format_of(path: Path) -> CaptureFormat:
     """Find out which format a capture is in.
 
@@ -103,11 +108,39 @@ def format_of(path: Path) -> CaptureFormat:
     fitting = [one for one in formats.values() if one.is_at(path)]
     if not fitting:
         marks = "; ".join(f"{one.title}: {one.marks}" for one in formats.values())
-        raise InputError(path, f"is no capture that is known. {marks}")
+        raise InputError(path, f"{_held(path)}is no capture that is known. {marks}")
     if len(fitting) > 1:
         names = " or ".join(one.name for one in fitting)
         raise InputError(path, f"may be a capture of {names}", "say which with `format`")
     return fitting[0]
+
+
+PICTURES = (".png", ".jpg", ".jpeg", ".heic", ".ppm", ".tif", ".tiff")
+
+
+def _held(path: Path) -> str:
+    """Say that a folder holds pictures without the poses that make a capture of them."""
+    if not path.is_dir():
+        return ""
+    folders = [path, *sorted(inner for inner in path.iterdir() if inner.is_dir())]
+    counts = {folder: _pictures(folder) for folder in folders}
+    found = [f"{n} in {folder.name}" for folder, n in counts.items() if n > 1]
+    if not found:
+        return ""
+    return (
+        f"holds pictures ({', '.join(found[:MOST_NAMED])}), but nothing known with their poses:"
+        " estimate them first, for example with COLMAP, and give its model beside the pictures. It "
+    )
+
+
+MOST_NAMED = 3
+
+
+def _pictures(folder: Path) -> int:
+    try:
+        return sum(file.suffix.lower() in PICTURES for file in folder.iterdir())
+    except OSError:
+        return 0  # not to be looked into
 
 
 def read_capture(path: Path, name: str | None = None) -> Capture:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from synfeal.camera.calibration import Calibration
@@ -48,20 +48,23 @@ def _read(path: Path) -> Capture:
         raise InputError(file, "its list 'frames' is empty")
     with read_as(f"{file}: depth_unit_scale_factor", "a number", TypeError, ValueError):
         units_per_m = 1.0 / float(values.get("depth_unit_scale_factor", METRES_PER_UNIT))
+    moved = _moved(file, values["frames"])
     frames, missing = [], []
     for index, entry in enumerate(values["frames"]):
         place = f"{file}: frames[{index}]"
         if not isinstance(entry, dict):
             raise InputError(place, "must hold a mapping of keys")
-        photograph = _image_at(file, entry.get("file_path"), f"{place}.file_path")
+        photograph = _image_at(file, entry.get("file_path"), f"{place}.file_path", moved)
         if photograph is None:
             missing.append(str(entry["file_path"]))
             continue
-        frames.append(_frame(file, photograph, values, entry, units_per_m, place))
+        frames.append(_frame(file, photograph, values, entry, units_per_m, place, moved))
     if not frames:
         raise InputError(file, f"{missing[0]} and all other images are missing", "copy them, too")
     frames.sort(key=lambda frame: frame.name)
-    notes = (f"{len(missing)} images are missing ({missing[0]}, ...)",) if missing else ()
+    notes = [f"{len(missing)} images are missing ({missing[0]}, ...)"] if missing else []
+    if moved:
+        notes.append(f"images are found without the first {_folders(moved)} of their paths")
     return Capture(path, FORMAT.name, tuple(frames), up=None, notes=(*notes, *_world(values)))
 
 
@@ -72,17 +75,49 @@ def _world(values: Mapping[str, Any]) -> tuple[str, ...]:
     return ()
 
 
-def _image_at(file: Path, name: Any, place: str) -> Path | None:
-    """Return the image of a name, with the ending that older files leave out; None if missing."""
+def _moved(file: Path, entries: list[Any]) -> int:
+    """Count the folders that the names of images begin with and that are not here.
+
+    Whoever moves a file of transforms beside the images leaves them in the names, as instant-ngp
+    wrote them: relative to where it ran.
+
+    Returns:
+        The least number without which an image of the first entry is here; 0 where there is none.
+    """
+    name = entries[0].get("file_path") if isinstance(entries[0], dict) else None
+    if not isinstance(name, str) or not names_below(name):
+        return 0
+    parts = PurePosixPath(name).parts
+    for count in range(len(parts)):
+        if _present(file.parent.joinpath(*parts[count:])) is not None:
+            return count
+    return 0
+
+
+def _folders(count: int) -> str:
+    return "folder" if count == 1 else f"{count} folders"
+
+
+def _image_at(file: Path, name: Any, place: str, moved: int) -> Path | None:
+    """Return the image of a name, with the ending that older files leave out; None if missing.
+
+    Args:
+        file: File of transforms.
+        name: The name.
+        place: Where it is said.
+        moved: Folders at the name's beginning that are not here.
+    """
     if not isinstance(name, str) or not name:
         raise InputError(place, "must name an image")
-    found = file.parent / name
     if not names_below(name):
         raise InputError(place, f"'{name}' leads out of the folder", "copy the image into it")
-    for candidate in (found, *(found.with_name(found.name + end) for end in (".png", ".jpg"))):
-        if candidate.is_file():
-            return candidate
-    return None
+    return _present(file.parent.joinpath(*PurePosixPath(name).parts[moved:]))
+
+
+def _present(named: Path) -> Path | None:
+    """Return the file of this name, or with one of the endings that may be left out."""
+    candidates = (named, *(named.with_name(named.name + end) for end in (".png", ".jpg")))
+    return next((path for path in candidates if path.is_file()), None)
 
 
 def _frame(
@@ -92,6 +127,7 @@ def _frame(
     entry: Mapping[str, Any],
     units_per_m: float,
     place: str,
+    moved: int,
 ) -> CapturedFrame:
     said = {**values, **entry}
     size = image_size(photograph)
@@ -102,7 +138,7 @@ def _frame(
     pose = rigid_pose(entry.get("transform_matrix"), f"{place}.transform_matrix") @ GL_FROM_CAM
     depth_file, depth_camera = None, None
     if entry.get("depth_file_path") is not None:
-        depth_file = _image_at(file, entry["depth_file_path"], f"{place}.depth_file_path")
+        depth_file = _image_at(file, entry["depth_file_path"], f"{place}.depth_file_path", moved)
         if depth_file is None:
             raise InputError(f"{place}.depth_file_path", f"{entry['depth_file_path']} is missing")
         depth_camera = resized(camera, *image_size(depth_file))

@@ -167,10 +167,10 @@ def inspect(arguments: argparse.Namespace) -> None:
     Writes numbers, a picture and an offline 3D page, and prints the command to collect a data set.
     Of a capture (docs/captures.md), its frames, cameras, clock and extent, and two pictures.
     """
-    from synfeal.captures.formats import is_capture
+    from synfeal.captures.formats import may_be_capture
     from synfeal.inspection.run import inspect_mesh
 
-    if arguments.format is not None or is_capture(arguments.mesh):
+    if arguments.format is not None or may_be_capture(arguments.mesh):
         _inspect_capture(arguments)
         return
 

@@ -404,6 +404,34 @@ def test_what_is_no_capture_is_told_what_one_is(tmp_path):
         format_of(tmp_path / "nothing")
 
 
+def test_pictures_without_poses_are_told_what_they_lack(tmp_path):
+    for folder in ("rgb", "depth"):
+        (tmp_path / folder).mkdir()
+        for number in range(3):
+            (tmp_path / folder / f"{number}.png").touch()
+    lacking = r"3 in depth, 3 in rgb\), but nothing known with their poses.*COLMAP"
+    for call in (format_of, synfeal.inspect, lambda path: synfeal.build(path, tmp_path / "place")):
+        with pytest.raises(InputError, match=lacking):
+            call(tmp_path)
+
+
+def test_images_are_found_where_the_folders_before_them_are_left_out(tmp_path):
+    path, _ = written("transforms", tmp_path)
+    expected = read_capture(path)
+    values = json.loads((path / "transforms.json").read_text())
+    for frame in values["frames"]:
+        for name in ("file_path", "depth_file_path"):
+            frame[name] = f"./data/phone/{frame[name]}"
+    (path / "transforms.json").write_text(json.dumps(values))
+    found = read_capture(path)
+    assert any("without the first 2 folders" in note for note in found.notes)
+    for one, other in zip(found.frames, expected.frames, strict=True):
+        assert one.name == other.name
+        assert np.array_equal(one.world_from_cam, other.world_from_cam)
+        assert np.array_equal(one.read_color(), other.read_color())
+        assert np.array_equal(one.read_depth_m(), other.read_depth_m())
+
+
 def test_a_folder_that_is_two_captures_asks_which(tmp_path):
     path, _ = written("transforms", tmp_path)
     WRITERS["colmap"](path)
