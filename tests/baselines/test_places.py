@@ -165,7 +165,9 @@ def test_a_capture_without_depth_is_refused_before_anything_is_written(capture, 
     bare = tmp_path / "bare"
     shutil.copytree(capture, bare, ignore=shutil.ignore_patterns("depth_*", "conf_*"))
     assert main(["build", str(bare), "--out", str(tmp_path / "place")]) == 1
-    assert "has no depth, of which a scan is made" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "has no depth, of which a scan is made" in said
+    assert "synfeal map" in said
     assert not (tmp_path / "place").exists()
 
 
