@@ -123,6 +123,8 @@ class CollectOptions(ViewOptions, total=False):
     test_paths: int | None
     mode: Mode
     poses: AnyPath | None
+    around_m: float | None
+    around_turn_deg: float | None
     stereo_m: float | None
     detail: Detail
     effects: AnyPath | Mapping[str, Any] | EffectsConfig | None

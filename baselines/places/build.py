@@ -25,7 +25,7 @@ from baselines.places.check import (
     trial_of,
 )
 from baselines.places.choices import choose, stride_of
-from baselines.places.place import Place, is_place
+from baselines.places.place import Place, cameras_of, is_place
 from baselines.places.report import write_report
 from baselines.references.map_frames import FrameChoice, read_map_frames
 from baselines.references.mapped import build_map, read_map
@@ -149,6 +149,7 @@ def build(job: PlaceJob, say: Callable[[str], None] = print) -> dict[str, Any]:
         if due:
             localize_known(place, known, job.seed)
     learn_of_photographs(place, known)
+    record["cameras"] = cameras_of(place)
     record["check"] = check_of(place, known)
     record["trial"] = trial_of(place)
     if job.train:
@@ -236,7 +237,7 @@ def _unpack(job: PlaceJob, place: Place, capture: Capture | None, run: _Run) -> 
 
 
 def _render_scan(job: PlaceJob, place: Place, run: _Run) -> tuple[Known, dict[str, float]]:
-    """Scan the unpacked capture, and render frames like its photographs.
+    """Scan the unpacked capture, and render frames around its photographs.
 
     Returns:
         Photographs to try the map on, and what was chosen of the scan, for ``place.json``.
@@ -269,6 +270,7 @@ def _render_scan(job: PlaceJob, place: Place, run: _Run) -> tuple[Known, dict[st
                 place.rendered,
                 job.frames,
                 like=place.frames,
+                mode="around",
                 width=job.width,
                 depth=True,
                 detail=DETAIL,

@@ -10,6 +10,7 @@ from baselines.references.stated_errors import FILE as TRIAL
 from synfeal.camera.calibration import read_calibration
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.captures.unpack import RECORD as CAPTURE_RECORD
+from synfeal.dataset.manifest import MANIFEST
 from synfeal.errors import InputError, read_as
 from synfeal.mesh.checks import SUFFIXES
 from synfeal.records.files import read_json
@@ -81,6 +82,17 @@ class Place:
 def is_place(folder: Path) -> bool:
     """Tell whether a folder is one that ``synfeal build`` made, finished or not."""
     return (folder / RECORD).is_file()
+
+
+def cameras_of(place: Place) -> dict[str, Any]:
+    """Say where the cameras of the rendered frames were placed, by the record of these frames.
+
+    Returns:
+        The mode of the collection; for ``around`` also how far from photographs, metres.
+    """
+    collection = read_json(place.rendered / MANIFEST)["collection"]
+    mode = collection["mode"]
+    return {"mode": mode, **({"around_m": collection["around_m"]} if mode == "around" else {})}
 
 
 def read_place(folder: Path) -> tuple[Place, dict[str, Any]]:

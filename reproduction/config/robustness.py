@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field, field_validator
 
-from synfeal.config.collection import CollectionConfig
+from synfeal.config.collection import INDEPENDENT, CollectionConfig
 from synfeal.config.effects import CLEAN, EffectsConfig
 from synfeal.config.types import Count, SizeName, Slug, Strict, part
 
@@ -49,7 +49,7 @@ class RobustnessConfig(Strict):
 
         Nothing is known of the lamps of a mesh of one's own, and independent frames do not move.
         """
-        still = collection.mode == "random"
+        still = collection.mode in INDEPENDENT
         possible = {
             name: effects
             for name, effects in self.effects.items()

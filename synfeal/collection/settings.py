@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from synfeal.config.collect import CollectConfig, LikeConfig, checked
+from synfeal.config.collection import AROUND_M
 from synfeal.errors import Argument, InputError
 from synfeal.planning.like import MIN_SEEN, MIN_VIEW_DISTANCE_M, Like, like_trajectory, resized
 
@@ -32,11 +33,19 @@ def collect_config(options: Mapping[str, Any]) -> tuple[CollectConfig, Like | No
     wanted = checked(LikeConfig, asked)
     if wanted.like is None:
         return checked(CollectConfig, given), None
+    is_around = given.get("mode") == "around"
+    if is_around:
+        given.setdefault("poses", wanted.like)
+        _refuse_box_options(wanted)
+        # So that the box holds all cameras; it bounds none.
+        margin_m = given.get("around_m", AROUND_M)
+    else:
+        margin_m = MARGIN_M if wanted.margin_m is None else wanted.margin_m
     like = like_trajectory(
         mesh=Path(given["mesh"]),
         sequence=wanted.like,
         frames=None if wanted.like_range is None else slice(*wanted.like_range),
-        margin_m=MARGIN_M if wanted.margin_m is None else wanted.margin_m,
+        margin_m=margin_m,
         margin_deg=MARGIN_DEG if wanted.angle_margin_deg is None else wanted.angle_margin_deg,
     )
     chosen = {
@@ -57,3 +66,13 @@ def collect_config(options: Mapping[str, Any]) -> tuple[CollectConfig, Like | No
         camera = resized(like.camera, chosen.pop("width", None), chosen.pop("height", None))
         chosen["camera"] = camera.model_copy(update={"stereo_baseline_m": None})
     return checked(CollectConfig, chosen), like
+
+
+def _refuse_box_options(wanted: LikeConfig) -> None:
+    """Refuse what says which box cameras are in, where they are placed by each photograph."""
+    for name, instead in (
+        ("margin_m", "give `around_m`"),
+        ("like_range", "give a sequence of those photographs alone"),
+    ):
+        if getattr(wanted, name) is not None:
+            raise InputError(Argument(name), 'does not go with `mode="around"`', instead)

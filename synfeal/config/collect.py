@@ -22,6 +22,8 @@ from pydantic import (
 
 from synfeal.camera.projection import Projection
 from synfeal.config.collection import (
+    AROUND_DEG,
+    AROUND_M,
     Angles,
     Box,
     ClutterConfig,
@@ -260,12 +262,23 @@ class CollectConfig(ViewConfig, PlaceConfig):
     mode: Mode = _like(
         CollectionConfig,
         "mode",
-        "straight paths, independent (random) poses, or those of `poses`",
+        "straight paths, independent (random) poses, those of `poses`, or independent ones around"
+        " these",
     )
     poses: Path | None = Field(
         None,
         description='with `mode="repeat"`: data set, 7-Scenes frames, pose table (.csv) or TUM'
-        " trajectory",
+        ' trajectory; with `mode="around"`: posed photographs, those of `like` if there are',
+    )
+    around_m: Annotated[Positive | None, Shown(("M",), f"{AROUND_M:g}")] = Field(
+        None, description='with `mode="around"`: farthest from a photograph, metres'
+    )
+    around_turn_deg: Annotated[
+        Annotated[float, Field(gt=0, le=180)] | None, Shown(("DEG",), f"{AROUND_DEG:g}")
+    ] = Field(
+        None,
+        description='with `mode="around"`: farthest turn from it, degrees; a quarter of the frames'
+        " look anywhere",
     )
     stereo_m: Annotated[StereoBaseline | None, Shown(("BASELINE_M",))] = Field(
         None, description="also render a second camera this far to the right, metres"
@@ -322,6 +335,8 @@ class CollectConfig(ViewConfig, PlaceConfig):
             {
                 "mode": self.mode,
                 "repeat": self.poses,
+                "around_m": self.around_m,
+                "around_turn_deg": self.around_turn_deg,
                 "frame_spacing_m": self.spacing_m,
                 "min_path_m": self.min_path_m,
                 "test_paths": TEST_PATHS if self.test_paths is None else self.test_paths,

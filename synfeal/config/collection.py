@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -131,24 +131,39 @@ class SceneConfig(Strict):
         return self
 
 
-Mode = Literal["path", "random", "repeat"]
+Mode = Literal["path", "random", "repeat", "around"]
+# Modes whose frames are no path, and are therefore still.
+INDEPENDENT: tuple[Mode, ...] = ("random", "around")
+# Farthest from a photograph in mode `around`: within an arm's reach, and at angles from which
+# features are still recognised.
+AROUND_M, AROUND_DEG = 0.5, 20.0
 TestPaths = Annotated[int, Field(ge=1, le=10**6)]
 
 
 class CollectionConfig(Strict):
     """Movement of the camera (section 3 of the paper)."""
 
-    unless_none = ("test_paths",)
+    unless_none = ("test_paths", "around_m", "around_turn_deg")
 
     mode: Mode = Field(
         "path",
         description="`path`: the paper's; `random`: independent poses; `repeat`: those of another"
-        " data set",
+        " data set; `around`: independent poses near those of photographs",
     )
     repeat: Path | None = Field(
         None,
         description="mode `repeat`: data set, directory of 7-Scenes frames, pose table (.csv) or"
-        " TUM trajectory (.txt)",
+        " TUM trajectory (.txt); mode `around`: posed photographs, as of a scan",
+    )
+    around_m: Positive | None = Field(
+        None,
+        description="mode `around`: farthest that a camera is from the photograph that it is placed"
+        f" by, metres; null: {AROUND_M}",
+    )
+    around_turn_deg: Annotated[float, Field(gt=0, le=180)] | None = Field(
+        None,
+        description="mode `around`: farthest that it is turned from it, degrees, but for a quarter"
+        f" of the frames, which look anywhere; null: {AROUND_DEG:g}",
     )
     candidates: int = Field(8, ge=1, le=10**4, description="targets tried per path (the paper's k)")
     frame_spacing_m: float = Field(
@@ -171,10 +186,24 @@ class CollectionConfig(Strict):
         " agree with the full mesh; null: no decimation",
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _reach_of_around(cls, values: Any) -> Any:
+        """Write down how far mode ``around`` goes, which other modes leave empty."""
+        if not isinstance(values, dict) or values.get("mode") != "around":
+            return values
+        usual = {"around_m": AROUND_M, "around_turn_deg": AROUND_DEG}
+        return values | {k: v for k, v in usual.items() if values.get(k) is None}
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.mode == "repeat" and self.repeat is None:
             raise ValueError("repeat: mode `repeat` needs the poses to repeat")
-        if self.mode != "repeat" and self.repeat is not None:
+        if self.mode == "around" and self.repeat is None:
+            raise ValueError("repeat: mode `around` needs posed photographs")
+        if self.mode not in ("repeat", "around") and self.repeat is not None:
             raise ValueError(f"repeat: mode `{self.mode}` repeats nothing; leave it out")
+        for name in ("around_m", "around_turn_deg"):
+            if self.mode != "around" and getattr(self, name) is not None:
+                raise ValueError(f"{name}: goes with mode `around`")
         return self

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from synfeal.config.collection import CollectionConfig
+from synfeal.config.collection import INDEPENDENT, CollectionConfig
 from synfeal.config.types import NonNegative, Positive, Seed, Strict
 
 Kelvin = Annotated[float, Field(ge=2000, le=25000)]
@@ -116,7 +116,7 @@ def refuse_long_exposure(effects: EffectsConfig, collection: CollectionConfig, k
     blur = effects.motion_blur
     if blur is None or collection.mode == "repeat":
         return
-    if collection.mode == "random":
+    if collection.mode in INDEPENDENT:
         raise ValueError(f"{key}.motion_blur: independent frames have no motion; leave it out")
     frame_s = collection.frame_spacing_m / effects.speed_m_s
     if blur.exposure_s > frame_s:

@@ -73,11 +73,8 @@ def like_trajectory(
     Raises:
         InputError: The sequence cannot be read.
     """
-    poses = read_posed_sequence(sequence, frames).world_from_cam
     record = read_scan_record(mesh)
-    if record is not None:
-        poses = meant_poses(poses, record.values.get("poses_are", "world_from_cam"))
-        poses = inverse(record.sequence_from_world) @ poses
+    poses = _read_poses(sequence, frames, record)
     low, high = poses[:, :3, 3].min(axis=0) - margin_m, poses[:, :3, 3].max(axis=0) + margin_m
     roll_deg, pitch_deg, yaw_deg = np.rad2deg(rpy_of(poses[:, :3, :3])).T
     return Like(
@@ -91,6 +88,31 @@ def like_trajectory(
         camera=_camera(sequence, record),
         n_frames=len(poses),
     )
+
+
+def photograph_poses(mesh: Path | None, sequence: Path) -> Array:
+    """Read where the photographs of a sequence were taken, in the world of a mesh.
+
+    Args:
+        mesh: File of the mesh, of which ``synfeal scan`` may have made a record; None where there
+            is none.
+        sequence: Posed photographs.
+
+    Returns:
+        Poses ``world_from_cam`` (N, 4, 4).
+
+    Raises:
+        InputError: The sequence cannot be read.
+    """
+    return _read_poses(sequence, None, None if mesh is None else read_scan_record(mesh))
+
+
+def _read_poses(sequence: Path, frames: slice | None, record: ScanRecord | None) -> Array:
+    poses = read_posed_sequence(sequence, frames).world_from_cam
+    if record is None:
+        return poses
+    poses = meant_poses(poses, record.values.get("poses_are", "world_from_cam"))
+    return np.asarray(inverse(record.sequence_from_world) @ poses)
 
 
 def rpy_of(rotation: Array) -> Array:

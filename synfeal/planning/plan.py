@@ -16,6 +16,8 @@ from synfeal.mesh.checks import check_sampling_box
 from synfeal.mesh.clearance import Clearance
 from synfeal.mesh.rays import RayCaster
 from synfeal.mesh.triangles import Triangles, load_collision_mesh
+from synfeal.planning.around import Reach, poses_around
+from synfeal.planning.like import photograph_poses
 from synfeal.planning.path import CandidateStream, independent_poses, path_poses, poses_of
 from synfeal.planning.repeat import repeated_poses
 from synfeal.planning.space import PoseSpace, sample_start
@@ -118,8 +120,9 @@ def plan_split(
 
     ``path``: connected straight paths; the last may be cut short. Where ``collection.test_paths``
     asks for more paths than whole ones would give, the test split takes every k-th frame of whole
-    paths. ``random``: independent admissible poses, each a path of its own. ``repeat``: the poses
-    of an earlier data set. Every box has paths of its own, and frames in proportion to its volume
+    paths. ``random``: independent admissible poses, each a path of its own. ``around``: such poses
+    near those of photographs, wherever the boxes are. ``repeat``: the poses of an earlier data set.
+    Every box has paths of its own, and frames in proportion to its volume
     in every prefix of the plan.
 
     Args:
@@ -140,9 +143,13 @@ def plan_split(
     """
     if n_frames < 1:
         raise InputError("plan", f"{n_frames} frames asked for; at least 1 is needed")
+    boxes = np.reshape(boxes, (-1, 2, 3))
+    if collection.mode == "around":
+        space = PoseSpace.of_scene(caster, boxes[0], scene, rng, clearance)
+        vectors = _around(space, scene.path, collection, n_frames)
+        return _pose_table(poses_of(vectors), np.arange(n_frames))
     if collection.repeat is not None:
         return repeated_poses(collection.repeat, split, n_frames, caster.bounds_m)
-    boxes = np.reshape(boxes, (-1, 2, 3))
     longest_m = float(np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1).max())
     if collection.mode == "path" and collection.frame_spacing_m > longest_m:
         raise InputError(
@@ -182,6 +189,21 @@ def _independent(
         if count:
             vectors[owner == index] = independent_poses(space, collection, count)
     return vectors
+
+
+def _around(
+    space: PoseSpace, mesh: Path | None, collection: CollectionConfig, n_frames: int
+) -> Array:
+    """Draw pose vectors (n_frames, 6) near the photographs of a mesh."""
+    sequence, radius_m, turn_deg = (
+        collection.repeat,
+        collection.around_m,
+        collection.around_turn_deg,
+    )
+    if sequence is None or radius_m is None or turn_deg is None:  # which the model refuses
+        raise ValueError("mode `around` without photographs")
+    photographs, reach = photograph_poses(mesh, sequence), Reach(radius_m, turn_deg)
+    return poses_around(space, photographs, reach, n_frames, collection.max_tries)
 
 
 def _paths(
