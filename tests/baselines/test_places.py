@@ -19,6 +19,7 @@ from baselines.places.place import Place, open_map
 from baselines.places.report import plan_of
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.cli import main
+from synfeal.config.collection import AROUND_M
 from synfeal.config.dataset import CameraConfig, RenderConfig
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.geometry.poses import pose_error, pose_from_quat, pose_matrix
@@ -95,7 +96,9 @@ def test_the_report_says_what_was_measured(place):
     assert record["finished"]
     assert (check["kind"], check["pictures"]) == ("fused photographs", 40)
     assert check["position_m"] < 0.05
+    assert record["cameras"] == {"mode": "around", "around_m": AROUND_M}
     page = (place / "report.html").read_text()
+    assert "within 0.5 m of the capture's own" in page
     assert f"{check['localized']} of 40 photographs" in page
     assert f"{100 * check['position_m']:.1f} cm" in page
     assert page.count("<circle") == 40
