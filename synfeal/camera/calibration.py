@@ -211,7 +211,7 @@ def _decoded(path: Path, text_in: Callable[[], str]) -> Calibration:
             return _from_colmap(text)
         if suffix == ".json":
             values = json.loads(text)
-            return _from_record(values) or _from_mapping(values)
+            return _from_record(values) or _from_transforms(values) or _from_mapping(values)
         if text.startswith("%YAML:"):  # OpenCV's header, which YAML has no name for
             text = text.partition("\n")[2]
         return _from_mapping(_first_document(text))
@@ -258,6 +258,29 @@ def _from_record(values: Any) -> Calibration | None:
         projection="fisheye" if is_fisheye else None,
         fisheye_k=_four(camera, ("fisheye_k",)) if camera.get("fisheye_k") else None,
     )
+
+
+def _from_transforms(values: Any) -> Calibration | None:
+    """Read the camera that a ``transforms.json`` of nerfstudio has for all of its images.
+
+    Like COLMAP, it has the centre of the first pixel at (0.5, 0.5).
+
+    Returns:
+        The camera; None where it is no such file, or each image has a camera of its own.
+    """
+    if not isinstance(values, Mapping) or "fl_x" not in values:
+        return None
+    is_fisheye = values.get("camera_model") == "OPENCV_FISHEYE" or values.get("is_fisheye") is True
+    width, height = _size(values, ("w", "h"))
+    pinhole = {name: values.get(name) for name in ("fl_x", "fl_y", "cx", "cy")}
+    pinhole["fl_y"] = values.get("fl_y", values["fl_x"])
+    fx, fy, cx, cy = (_numbers(pinhole, (name,), (1,))[0] for name in pinhole)
+    names = ("k1", "k2", "k3", "k4") if is_fisheye else ("k1", "k2", "p1", "p2", "k3", "k4")
+    lens = [_numbers({name: values.get(name, 0.0)}, (name,), (1,))[0] for name in names]
+    if is_fisheye:
+        k1, k2, k3, k4 = lens
+        return Calibration(width, height, fx, fy, cx, cy, PINHOLE, "fisheye", (k1, k2, k3, k4))
+    return Calibration(width, height, fx, fy, cx, cy, _five("k4", lens))
 
 
 def _from_mapping(values: Any) -> Calibration:

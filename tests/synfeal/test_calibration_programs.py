@@ -167,6 +167,11 @@ Feature:
 """
 
 
+# COLMAP's centre of the first pixel is half a pixel further than OpenCV's.
+NERFSTUDIO = {"w": WIDTH, "h": HEIGHT, "fl_x": FX, "fl_y": FY, "cx": CX + 0.5, "cy": CY + 0.5}
+NERFSTUDIO |= {"aabb_scale": 16, "frames": []}
+
+
 def realsense(model, coeffs):
     return json.dumps({**REALSENSE, "model": model, "coeffs": coeffs})
 
@@ -188,12 +193,20 @@ FILES = {
         NONE,
     ),
     "open3d-poses.json": (json.dumps({"parameters": [{"intrinsic": OPEN3D}] * 2}), NONE),
+    "transforms.json": (
+        json.dumps({**NERFSTUDIO, "k1": K1, "k2": K2, "p1": P1, "p2": P2, "k3": 0}),
+        LENS,
+    ),
     "vins.yaml": (VINS, LENS),
     "stella.yaml": (STELLA, LENS),
 }
 FISHEYES = {
     "kalibr.yaml": KALIBR_WIDE,
     "orbslam.yaml": KANNALA,
+    "transforms.json": json.dumps(
+        {**NERFSTUDIO, "camera_model": "OPENCV_FISHEYE"}
+        | dict(zip(("k1", "k2", "k3", "k4"), WIDE, strict=True))
+    ),
     "t265.json": realsense("distortion.kannala_brandt4", [*WIDE, 0.0]),
 }
 
@@ -277,6 +290,8 @@ SECOND = KALIBR.replace("cam0", "cam1").replace(str(FX), "460.0")
         ("a.json", realsense("inverse_brown_conrady", [0.1, 0, 0]), "coeffs: must hold 5"),
         ("a.yaml", ORBSLAM2.replace("Camera.width", "#"), "Camera.width: missing"),
         ("a.json", json.dumps({**OPEN3D, "width": None}), "image_width: must hold numbers"),
+        ("a.json", json.dumps({**NERFSTUDIO, "fl_y": "wide"}), "fl_y: must hold numbers"),
+        ("a.json", json.dumps({**NERFSTUDIO, "k4": 0.1}), "k4: only k1, k2, p1, p2 and k3"),
         ("a.json", json.dumps({"parameters": []}), "parameters: hold no camera"),
         ("a.yaml", VINS.replace("PINHOLE", "MEI"), "model_type: 'MEI' is not read"),
     ],
