@@ -40,6 +40,24 @@ def test_the_pages_show_the_published_results(monkeypatch):
     assert main(["--check"]) == 0
 
 
+def test_the_readme_tells_networks_of_the_papers_size_as_they_were_measured():
+    measured = pd.read_csv(REPOSITORY / "results/benchmarks/gpu_errors.csv")
+    large = measured[measured.input_px == 224].set_index("localizer").position_m
+    night = pd.read_csv(NIGHT / "tables/references.csv").query(
+        "scene == 'large_room' and size == '6k' and labels == 'synfeal'"
+    )
+    small = night.set_index("method").position_m_true
+    told = re.search(
+        r"off by (\d+) and (\d+) cm in the Large Room instead of (\d+) and (\d+), matched"
+        r" features by ([\d.]+)",
+        (REPOSITORY / "README.md").read_text(),
+    )
+    networks = ("posenet", "posenet2")
+    expected = [large[name] for name in networks] + [small[name] for name in networks]
+    assert [int(number) for number in told.groups()[:4]] == [round(100 * m) for m in expected]
+    assert float(told.group(5)) == round(100 * small["structure-rays"], 1)
+
+
 def test_what_pages_name_is_there():
     page = (REPOSITORY / "docs/architecture.md").read_text()
     ways = page.split("## Five ways")[1].split("\n## ")[0]
