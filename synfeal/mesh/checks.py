@@ -243,8 +243,10 @@ def repaired(part: MeshPart, findings: Findings) -> MeshPart:
     else:
         _count(findings, part, n_repeated, "duplicate", "removed")
     faces = faces[first]
-    _, place = distinct_rows(part.vertices_m)
-    doubled = len(faces) - len(_first_of_each(place[faces]))
+    distinct, place = distinct_rows(part.vertices_m)
+    doubled = 0
+    if len(distinct) < len(place):
+        doubled = len(faces) - len(_first_of_each(place[faces]))
     _count(findings, part, doubled, "coincident", "kept: their vertices or texture differ")
     part = replace(part, faces=faces)
     if part.uv is not None and not np.isfinite(part.uv).all():
@@ -271,12 +273,11 @@ def _count(findings: Findings, part: MeshPart, count: int, kind: str, what: str)
 
 def _without_area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Mark faces (F,) that are a point or a line; a thin sliver is neither, however small."""
-    corners = vertices[faces]
-    edges = np.roll(corners, -1, axis=1) - corners
-    lengths = np.linalg.norm(edges, axis=2)
-    longest = lengths.max(axis=1)
-    twice_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    rounding = ROUNDING * np.abs(corners).max(axis=(1, 2))
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    edges = (b - a, c - b, a - c)
+    longest = np.sqrt(np.max([np.einsum("fi,fi->f", edge, edge) for edge in edges], axis=0))
+    twice_area = np.linalg.norm(np.cross(edges[0], edges[1]), axis=1)
+    rounding = ROUNDING * np.abs(vertices).max(axis=1)[faces].max(axis=1)
     without: NDArray[np.bool_] = twice_area <= longest * (RELATIVE_HEIGHT * longest + rounding)
     return without
 

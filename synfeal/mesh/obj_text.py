@@ -283,12 +283,16 @@ class _Reader:
         if not lines:
             return
         line_of, count_of = np.concatenate(lines), np.concatenate(counts)
-        corners = _in_order(line_of, count_of)
-        order = np.argsort(line_of, kind="stable")
-        self.counts.append(count_of[order])
-        self.use_of.append(use_of[line_of[order]])
-        self.corner_vertex.append(np.concatenate(vertex)[corners])
-        self.corner_uv.append(np.concatenate(uv)[corners])
+        corner_vertex, corner_uv = np.concatenate(vertex), np.concatenate(uv)
+        if len(lines) > 1:  # forms, each of which is in order
+            corners = _in_order(line_of, count_of)
+            corner_vertex, corner_uv = corner_vertex[corners], corner_uv[corners]
+            order = np.argsort(line_of, kind="stable")
+            line_of, count_of = line_of[order], count_of[order]
+        self.counts.append(count_of)
+        self.use_of.append(use_of[line_of])
+        self.corner_vertex.append(corner_vertex)
+        self.corner_uv.append(corner_uv)
 
     def finished(self) -> ObjText:
         """Join what was read, and check what faces name.

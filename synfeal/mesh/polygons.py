@@ -58,13 +58,17 @@ def triangulated(points: Floats, counts: Ints, corners: Ints) -> Triangulation:
             block = group[start : start + BLOCK]
             of_corners = first[block, None] + np.arange(count)
             triangles, area[block], covered[block] = _cut(points[corners[of_corners]])
-            pieces.append(np.take_along_axis(of_corners[:, None], triangles, axis=2).reshape(-1, 3))
+            if count > 3:
+                of_corners = np.take_along_axis(of_corners[:, None], triangles, axis=2)
+            pieces.append(of_corners.reshape(-1, 3))
             owners.append(np.repeat(block, count - 2))
     if not pieces:
         return Triangulation(np.zeros((0, 3), np.int64), np.zeros(0, np.int64), area, covered)
     found, polygon = np.concatenate(pieces), np.concatenate(owners)
-    order = np.argsort(polygon, kind="stable")
-    return Triangulation(found[order], polygon[order], area, covered)
+    if counts.min() < counts.max():
+        order = np.argsort(polygon, kind="stable")
+        found, polygon = found[order], polygon[order]
+    return Triangulation(found, polygon, area, covered)
 
 
 def _cut(outlines: Floats) -> tuple[Ints, Floats, Floats]:
