@@ -75,8 +75,15 @@ def _read(path: Path) -> Capture:
         )
     if not frames:
         raise InputError(path, "no photograph has a pose and a calibration near in time")
-    notes = (f"{lost} of {len(photographs)} photographs have no pose near in time",) if lost else ()
-    return Capture(path, FORMAT.name, tuple(frames), up=(0.0, 0.0, 1.0), notes=notes)
+    notes = []
+    if lost:
+        notes.append(f"{lost} of {len(photographs)} photographs have no pose near in time")
+    photograph_s = np.array(list(photographs))
+    gaps_s = [float(np.abs(photograph_s - time_s).min()) for time_s in calibrations]
+    missing = sum(gap_s > CALIBRATION_SLACK_S for gap_s in gaps_s)
+    if missing:
+        notes.append(f"{missing} of {len(calibrations)} calibrations have no photograph")
+    return Capture(path, FORMAT.name, tuple(frames), up=(0.0, 0.0, 1.0), notes=tuple(notes))
 
 
 def _trajectory(path: Path) -> tuple[Array, Array]:

@@ -40,6 +40,7 @@ def _read(path: Path) -> Capture:
     stems = sorted(photographs.keys() & poses.keys(), key=int)
     if not stems:
         raise InputError(path, "no file of color has one of the same number in pose")
+    notes = _unpaired(set(photographs), set(poses))
     size = image_size(photographs[stems[0]])
     color_matrix = _matrix(path / "intrinsic" / "intrinsic_color.txt")
     pinhole = color_matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
@@ -76,8 +77,23 @@ def _read(path: Path) -> Capture:
         )
     if not frames:
         raise InputError(path / "pose", f"none of the {len(stems)} poses is finite")
-    notes = (f"{lost} of {len(stems)} frames have no pose: tracking was lost",) if lost else ()
-    return Capture(path, FORMAT.name, tuple(frames), depth_from_color, notes=notes)
+    if lost:
+        notes.append(f"{lost} of {len(stems)} frames have no pose: tracking was lost")
+    return Capture(path, FORMAT.name, tuple(frames), depth_from_color, notes=tuple(notes))
+
+
+def _unpaired(photographs: set[str], poses: set[str]) -> list[str]:
+    """Say how many photographs have no pose file of their number, and how many poses none."""
+    notes = []
+    for found, others, noun, other in (
+        (poses, photographs, "poses", "photograph"),
+        (photographs, poses, "photographs", "file in pose"),
+    ):
+        alone = found - others
+        if alone:
+            first = min(alone, key=int)
+            notes.append(f"{len(alone)} of {len(found)} {noun} have no {other} ({first}, ...)")
+    return notes
 
 
 def _pose(path: Path) -> Array | None:

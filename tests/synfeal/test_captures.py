@@ -23,6 +23,7 @@ from synfeal.cli import main
 from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.errors import InputError
 from synfeal.geometry.poses import inverse
+from synfeal.inspection.captured import capture_facts
 from synfeal.scanning.run import ScanJob, scan
 from tests import ROOT
 from tests.support.capture_writers import (
@@ -204,6 +205,26 @@ def test_inspected_it_says_what_it_holds(captured, tmp_path, capsys):
         with Image.open(out / picture) as image:
             assert min(image.size) >= 400
     assert f"synfeal build {capture.path}" in capsys.readouterr().out
+
+
+LOST_PHOTOGRAPHS = {
+    "arkitscenes": ("lowres_wide/*.png", "1 of 40 calibrations have no photograph"),
+    "colmap": ("images/hall/*20.png", "1 images are missing (hall/my photo 020.png, ...)"),
+    "polycam": ("keyframes/corrected_images/*.jpg", "1 cameras have no image"),
+    "scannet": ("color/27.jpg", "1 of 41 poses have no photograph (27, ...)"),
+    "transforms": ("images/*20.png", "1 images are missing (images/frame_00020.png, ...)"),
+}
+
+
+@pytest.mark.parametrize("name", LOST_PHOTOGRAPHS)
+def test_a_photograph_that_is_missing_is_told(name, tmp_path):
+    path, _ = written(name, tmp_path)
+    files, said = LOST_PHOTOGRAPHS[name]
+    found = sorted(path.glob(files))
+    found[len(found) // 2].unlink()
+    facts = capture_facts(read_capture(path))
+    assert facts["frames"] == len(shots().rgb) - 1
+    assert any(said in line for line in facts["missing"])
 
 
 def test_options_of_meshes_are_refused_for_captures(tmp_path, capsys):
