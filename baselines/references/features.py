@@ -58,6 +58,12 @@ class Features(ByFrame):
         """Points (K, 3) in camera coordinates; not finite where there is no depth."""
         return np.column_stack([self.slope, np.ones(len(self.slope))]) * self.depth_m[:, None]
 
+    def points_in_world_m(self, world_from_cam: Array) -> Array:
+        """Compute points (K, 3) in the world from the poses (N, 4, 4) of the frames."""
+        pose = world_from_cam[self.frame]
+        turned = np.einsum("kij,kj->ki", pose[:, :3, :3], self.point_m)
+        return np.asarray(turned + pose[:, :3, 3])
+
     def roots(self, frame: int) -> NDArray[np.float32]:
         """Compute RootSIFT (k, 128) of a frame (Arandjelović and Zisserman, CVPR 2012)."""
         return roots_of(self.descriptor[self.of(frame)])

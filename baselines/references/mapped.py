@@ -9,12 +9,13 @@ trained but the vocabulary of DenseVLAD. A map is a folder of plain files::
     frames.csv      poses of the frames, world_from_cam, with their names
     features.npz    features of the frames and their depth
     retrieval.npz   DenseVLAD of the frames, and its vocabulary
+    repeats.npz     where frames look the same as others elsewhere (earlier maps have none)
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ from baselines.references.arrays import Vectors, read_arrays, write_arrays
 from baselines.references.descriptors import CHUNK, Vlad
 from baselines.references.features import Features
 from baselines.references.map_frames import MapFrames, MeshFile
+from baselines.references.repeats import PosedFeatures, Repeats, find_repeats
 from baselines.references.triangulated import triangulated
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
@@ -59,6 +61,7 @@ Array = NDArray[np.float64]
 
 FORMAT, VERSION = "synfeal map", 1
 RECORD, FRAMES, FEATURES, RETRIEVAL = "map.json", "frames.csv", "features.npz", "retrieval.npz"
+REPEATS = "repeats.npz"
 VIEW_PX = 64  # side of what retrieval sees of a frame, squeezed into a square
 # Most features of a frame, and their least contrast (OpenCV's default is 0.04): rendered surfaces
 # are smoother than photographs of them.
@@ -88,6 +91,7 @@ class StructureMap:
         sequence_from_world: Rigid motion (4, 4) to the world of the scanned sequence, if any.
         mesh_file: How the mesh that the frames were rendered of is to be read.
         record: Further entries of ``map.json``.
+        repeats: Where frames look the same as others elsewhere; none where that was not searched.
     """
 
     names: tuple[str, ...]
@@ -99,6 +103,7 @@ class StructureMap:
     sequence_from_world: Array | None
     mesh_file: MeshFile
     record: dict[str, Any]
+    repeats: Repeats = field(default_factory=Repeats.none)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -106,9 +111,7 @@ class StructureMap:
     @cached_property
     def point_m(self) -> Array:
         """Positions (K, 3) of the features in the world, metres."""
-        pose = self.world_from_cam[self.features.frame]
-        turned = np.einsum("kij,kj->ki", pose[:, :3, :3], self.features.point_m)
-        return np.asarray(turned + pose[:, :3, 3])
+        return self.features.points_in_world_m(self.world_from_cam)
 
     @cached_property
     def quat_wxyz(self) -> Array:
@@ -167,6 +170,17 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         focal_px = float(frames.camera.intrinsics[0])
         features = triangulated(features, frames.world_from_cam, vectors, focal_px)
     _refuse_few(features, frames)
+    mapped_s = time.perf_counter() - began
+    repeats = find_repeats(
+        PosedFeatures(
+            world_from_cam=frames.world_from_cam,
+            camera=frames.camera,
+            features=features,
+            point_m=features.points_in_world_m(frames.world_from_cam),
+            vectors=vectors,
+        ),
+        seed,
+    )
     record = {
         "format": FORMAT,
         "version": VERSION,
@@ -176,7 +190,9 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         "rgbd_camera": frames.rgbd.record,
         "max_features": MAX_FEATURES,
         "contrast": CONTRAST,
-        "seconds": round(time.perf_counter() - began, 1),
+        "seconds": round(mapped_s, 1),
+        "look_alikes": len(repeats.frame),
+        "repeats_seconds": round(time.perf_counter() - began - mapped_s, 1),
         "provenance": provenance(seed, "none"),
     }
     made = StructureMap(
@@ -189,6 +205,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         sequence_from_world=frames.sequence_from_world,
         mesh_file=frames.mesh_file,
         record=record,
+        repeats=repeats,
     )
     with writing_to(out, lambda: "choose another folder with `out`"):
         write_map(made, out)
@@ -255,13 +272,15 @@ def write_map(made: StructureMap, out: Path) -> None:
                 "axes": vlad.axes,
             },
         )
+        made.repeats.write(folder / REPEATS)
         sequence = made.sequence_from_world
+        written = (FRAMES, FEATURES, RETRIEVAL, REPEATS)
         record = {
             **made.record,
             "camera": made.camera.record,
             "mesh_file": made.mesh_file.model_dump(),
             KEY: None if sequence is None else sequence.tolist(),
-            "sha256": {name: file_sha256(folder / name) for name in (FRAMES, FEATURES, RETRIEVAL)},
+            "sha256": {name: file_sha256(folder / name) for name in written},
         }
         write_json(folder / RECORD, record)
 
@@ -278,6 +297,7 @@ def read_map(folder: Path) -> StructureMap:
     features = Features.read(folder / FEATURES)
     stored = read_arrays(folder / RETRIEVAL, ("vectors", "words", "mean", "axes"))
     _check_shapes(folder, len(table), features, stored)
+    repeats = _read_repeats(folder / REPEATS, len(table))
     return StructureMap(
         names=names,
         world_from_cam=table.world_from_cam,
@@ -288,6 +308,7 @@ def read_map(folder: Path) -> StructureMap:
         sequence_from_world=sequence_from_world,
         mesh_file=shown.mesh_file or MeshFile(),
         record=record,
+        repeats=repeats,
     )
 
 
@@ -309,6 +330,16 @@ def _read_record(folder: Path) -> tuple[dict[str, Any], Shown, Array | None]:
         raise InputError(path, describe(error), REMEDY) from error
     sequence_from_world = None if record.get(KEY) is None else rigid_motion_of(record, path)
     return record, shown, sequence_from_world
+
+
+def _read_repeats(path: Path, n_frames: int) -> Repeats:
+    """Read the repeats of a map; none where it is of a version that did not search them."""
+    if not path.is_file():
+        return Repeats.none()
+    repeats = Repeats.read(path)
+    if not repeats.fits(n_frames):
+        raise InputError(path, f"is not of the frames of {FRAMES}", REMEDY)
+    return repeats
 
 
 def _check_shapes(

@@ -28,6 +28,7 @@ from baselines.references.correspondences import mutual_matches
 from baselines.references.features import roots_of
 from baselines.references.mapped import VIEW_PX, StructureMap, detect, detector
 from baselines.references.pose_covariance import Spread, pose_covariance, spread_of
+from baselines.references.repeats import MAX_ERROR_PX, METRES_PER_RADIAN, RATIO
 from baselines.references.structure import pinhole, refined_focal_px, refined_pose, supported_pose
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.distortion import distort, undistort
@@ -42,19 +43,17 @@ Rows = NDArray[np.int64]
 RETRIEVED = 20  # frames that a photograph is matched with, once its pose is nearly known
 # Those that look most alike: of a place that repeats itself, frames of each repeat must be there.
 FIRST_RETRIEVED = 40
-# Share of the inliers that a pose elsewhere has, from which nothing tells which of both is right.
-ALIKE = 0.75
+# Share of the inliers that a pose elsewhere has, from which nothing tells which of both is right:
+# the right place has fewer where no frame of the map was taken like the photograph.
+ALIKE = 0.7
+ELSEWHERE = 0.5  # share of what a pose explains by other things, from which it is one elsewhere
 MOST_PLACES = 8  # that may look like what a photograph shows
+MOST_ROUNDS = 3  # of look-alikes of a pose that was itself a look-alike
 APART_M, APART_RAD = 0.3, np.radians(10.0)  # between poses of different places
-RATIO = 0.85
-MAX_ERROR_PX = 6.0  # in the map's frames; poses of a scan contradict each other by some pixels
 # Matches that miss by this many times the largest error of an inlier may miss because the focal
 # length is wrong; by this many because the lens is not known.
 FOCAL_ERRORS, ROUGHLY = 2.0, 5.0
 SAMPLES = 4  # along each side of a pixel of what retrieval sees
-# How many metres a radian counts in "nearest": turning by 30 degrees changes what is seen about as
-# much as a step of a metre does.
-METRES_PER_RADIAN = 2.0
 
 
 class Photograph(NamedTuple):
@@ -99,7 +98,7 @@ class Answer(NamedTuple):
         """Tell whether another place explains the photograph about as well."""
         if self.rival is None:
             return False
-        return self.rival.inliers >= ALIKE * self.support.inliers
+        return self.rival.share >= ALIKE
 
 
 class Rival(NamedTuple):
@@ -107,11 +106,13 @@ class Rival(NamedTuple):
 
     Attributes:
         world_from_cam: Pose (4, 4) in the world of the map.
-        inliers: Features of the photograph that it explains by something else than the answer does.
+        inliers: Features of the photograph that it explains, most by other things than the answer.
+        share: Their number over that of the answer's, both by matches with the same frames.
     """
 
     world_from_cam: Array
     inliers: int
+    share: float
 
 
 NOT_FOUND = Answer(np.full((4, 4), np.nan), NO_SUPPORT, float("nan"))
@@ -177,19 +178,32 @@ class Finder:
         places = [self._settled(matched, attempt, among) for attempt in candidates]
         if not places:
             return NOT_FOUND
-        best = max(places, key=lambda attempt: attempt.support.inliers)
-        rivals = [
-            Rival(attempt.world_from_cam, self._elsewhere(attempt, best))
-            for attempt in places
-            if _are_apart(attempt.world_from_cam, best.world_from_cam)
-        ]
+        places = self._with_look_alikes(matched, places, among)
+        matches = matched.with_all()
+        compared = [self._supported(matches, attempt.world_from_cam) for attempt in places]
+        first = max(range(len(places)), key=lambda index: compared[index].support.inliers)
+        best = places[first]
         return Answer(
             world_from_cam=best.world_from_cam,
             support=best.support,
             focal_ratio=self._focal_ratio(best),
-            rival=max(rivals, key=lambda rival: rival.inliers, default=None),
+            rival=self._rival(compared[first], compared),
             spread=self._spread(best),
         )
+
+    def _rival(self, best: _Attempt, others: Iterable[_Attempt]) -> Rival | None:
+        """Return the pose elsewhere with most support, all of them by the same matches."""
+        rivals = [
+            Rival(
+                world_from_cam=other.world_from_cam,
+                inliers=other.support.inliers,
+                share=other.support.inliers / max(best.support.inliers, 1),
+            )
+            for other in others
+            if _are_apart(other.world_from_cam, best.world_from_cam)
+            and self._elsewhere(other, best) >= ELSEWHERE * other.support.inliers
+        ]
+        return max(rivals, key=lambda rival: rival.inliers, default=None)
 
     def _elsewhere(self, attempt: _Attempt, best: _Attempt) -> int:
         """Count the features that an attempt explains by something else than the best one does.
@@ -227,6 +241,33 @@ class Finder:
             if all(_are_apart(other.world_from_cam, known.world_from_cam) for known in found):
                 found.append(other)
         return found[:MOST_PLACES]
+
+    def _with_look_alikes(
+        self, matched: _Matched, places: list[_Attempt], among: Rows
+    ) -> list[_Attempt]:
+        """Add the poses that the best one may be mistaken for, until none is better.
+
+        Retrieval names frames that look most alike, which may all be of the wrong repeats.
+        """
+        places, asked = list(places), [attempt.world_from_cam for attempt in places]
+        for _ in range(MOST_ROUNDS):
+            best = max(places, key=lambda attempt: attempt.support.inliers)
+            frames = self._place.world_from_cam
+            new: list[Array] = []
+            for pose in self._place.repeats.look_alikes(best.world_from_cam, frames):
+                if all(_are_apart(pose, known) for known in asked):
+                    asked.append(pose)
+                    new.append(pose)
+                if len(new) == MOST_PLACES:
+                    break
+            for pose in new:
+                matches = matched.with_frames(self.nearest(pose, among))
+                attempt = self._settled(matched, self._supported(matches, pose), among)
+                if attempt.support.confidence >= LEAST_CONFIDENCE:
+                    places.append(attempt)
+            if not new or best is max(places, key=lambda attempt: attempt.support.inliers):
+                break
+        return places
 
     def _settled(self, matched: _Matched, attempt: _Attempt, among: Rows) -> _Attempt:
         """Match the frames that were taken nearest to a pose too, and keep the better one."""
@@ -392,6 +433,10 @@ class _Matched:
         self._place = place
         self._pixel = photograph.slope * focal_px
         self._by_frame: dict[int, tuple[Rows, Rows]] = {}
+
+    def with_all(self) -> _Matches:
+        """List the matches with all frames that were matched so far."""
+        return self.with_frames(sorted(self._by_frame))
 
     def with_frames(self, frames: Iterable[int]) -> _Matches:
         """List the matches with some frames of the map."""

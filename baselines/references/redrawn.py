@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from baselines.references.map_frames import depth_along
 from baselines.references.mapped import StructureMap
-from baselines.references.photographs import MAX_ERROR_PX, Answer, Photograph
+from baselines.references.photographs import Answer, Photograph
+from baselines.references.repeats import MAX_ERROR_PX
 from baselines.references.structure import pinhole, supported_pose
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import RenderConfig
