@@ -474,7 +474,9 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
         return None
     doses = [
         f"{title} {100 * own.position_m_median[name]:.1f} cm"
-        f" and {own.orientation_deg_median[name]:.1f}°"
+        f" and {own.orientation_deg_median[name]:.1f}°,"
+        f" at most {100 * own.position_m_max[name]:.0f} cm and"
+        f" {own.orientation_deg_max[name]:.1f}°"
         for name, title in names.items()
     ]
     changes = {
@@ -504,9 +506,9 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
         if failing
         else "Exact labels in place of those of SfM and RGB-D SLAM: the difference is too small to"
         " see.",
-        f"The estimated labels are off by some centimetres at most (medians: {', '.join(doses)}),"
-        f" the networks by {errors_m.min():.0f} to {errors_m.max():.0f} cm, so these label errors"
-        f" can do little. Exact labels change the position and orientation errors, averaged over"
+        f"The estimated labels are off by little in the median ({'; '.join(doses)}), the networks"
+        f" by {errors_m.min():.0f} to {errors_m.max():.0f} cm, so these label errors can do little."
+        f" Exact labels change the position and orientation errors, averaged over"
         f" the five networks, by {', '.join(texts)}. With exact labels instead of SfM's, {lower} of"
         f" {counted} errors are lower{likely}; those of PoseNet2 change by {percent(single[0])}"
         f" and {percent(single[1])} {_printed(*posenet2)}.{failing}",

@@ -186,7 +186,9 @@ def fresh_answer(published: Path = PUBLISHED) -> str:
     titles = {str(verdict): f"**{verdict}** ({text})" for verdict, text in SHOWN_MEANINGS.items()}
     groups: dict[str, list[str]] = {name: [] for name in (*titles, CONTRADICTED)}
     for own in judged.values():
-        groups[_outcome(own)].append(f"    - {own[0].claim.statement} ({_runs_behind(own)})")
+        groups[_outcome(own)].append(
+            f"    - claimed: “{own[0].claim.statement}” ({_runs_behind(own)})"
+        )
     lines = [
         line
         for name, claims in groups.items()
