@@ -58,6 +58,34 @@ def test_the_readme_tells_networks_of_the_papers_size_as_they_were_measured():
     assert float(told.group(5)) == round(100 * small["structure-rays"], 1)
 
 
+def test_objections_are_met_with_numbers_of_the_tables():
+    page = (REPOSITORY / "docs/objections.md").read_text()
+    lower = []
+    for run in ("labels", "night", "better_labels"):
+        cells = pd.read_csv(NIGHT.with_name(run) / "tables/table2_ground_truth.csv")
+        sfm, exact = (cells[cells.labels == n].set_index("model") for n in ("sfm", "synfeal"))
+        errors = ["position_m_true", "orientation_deg_true"]
+        lower.append(int((exact[errors] < sfm[errors]).to_numpy().sum()))
+    counts = "in {} of 10 columns of `labels`, in {} of 10 of `night` and of `better_labels`"
+    assert lower[1] == lower[2]
+    assert counts.format(*lower[:2]) in page
+
+    passes = pd.read_csv(REPOSITORY / "results/benchmarks/passes.csv")
+    posenet = passes[passes.localizer == "PoseNet"].pivot_table(
+        index="passes", columns="labels", values="orientation_deg"
+    )
+    harm = (posenet["noisy"] / posenet["exact"] - 1) * 100
+    told = "by +{:.0f} % after 5 passes, +{:.0f} % after 20 and +{:.0f} % after 60"
+    assert told.format(*harm.loc[[5, 20, 60]]) in page
+
+    large = pd.read_csv(REPOSITORY / "results/benchmarks/gpu_errors.csv").query("input_px == 224")
+    metres = large.set_index("localizer").position_m
+    told = "PoseNet is at {:.2f} m, PoseNet2 at {:.2f} m, PoseLSTM, shown half as many images, at"
+    assert (
+        told.format(metres["posenet"], metres["posenet2"]) + f" {metres['poselstm']:.2f} m" in page
+    )
+
+
 def test_what_pages_name_is_there():
     page = (REPOSITORY / "docs/architecture.md").read_text()
     ways = page.split("## Five ways")[1].split("\n## ")[0]
