@@ -70,6 +70,8 @@ class PoseList:
     # (N, 4) radii that the file states, columns of ``STATED``, NaN where it states none; None of a
     # file without these columns
     stated: Array | None = None
+    # whether there is a row for every frame that was to be localized, found or not
+    names_all_asked: bool = False
 
     @property
     def counts_seconds(self) -> bool:

@@ -337,6 +337,7 @@ def read_csv(path: Path, text: str) -> PoseList:
         values[:, 3:],
         frame_key="name" if named else "index",
         stated=table.numbers(STATED, may_be_empty=True) if states_errors else None,
+        names_all_asked=may_be_empty,
     )
 
 

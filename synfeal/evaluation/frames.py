@@ -42,6 +42,9 @@ log = logging.getLogger("synfeal")
 Key = tuple[str, int]  # sequence and number of a frame
 
 
+UNSPLIT = "all"
+
+
 @dataclass(frozen=True)
 class ScoredFrames:
     """Frames of a split in order, or the poses of a file that stands in place of a data set.
@@ -54,7 +57,7 @@ class ScoredFrames:
         frames: Files (N) of the frames; none of a file of poses.
         gap: Frame that the numbers of the others leave out.
         frame_key: How a file of poses says which frame one is of.
-        n_left_out: Poses of a file that are not scored, because nothing was estimated then.
+        n_left_out: Frames that are not scored, because nothing was estimated, or asked, of them.
         stored_from_upright: Rotations (N, 4, 4) by which EXIF turns the photographs; None where it
             turns none.
     """
@@ -75,12 +78,15 @@ class ScoredFrames:
         return self.split if self.frame_key else f"{self.split} split"
 
     def at(self, chosen: NDArray[np.int64]) -> ScoredFrames:
-        """Select the poses of a file by index (K,)."""
+        """Select frames by index (K,)."""
+        turns = self.stored_from_upright
         return replace(
             self,
             names=tuple(self.names[index] for index in chosen),
             world_from_cam=self.world_from_cam[chosen],
             path=self.path[chosen],
+            frames=tuple(self.frames[index] for index in chosen) if self.frames else (),
+            stored_from_upright=None if turns is None else turns[chosen],
             n_left_out=len(self.names) - len(np.unique(chosen)),
         )
 
@@ -140,7 +146,7 @@ def _unsplit_photographs(dataset: Path) -> ScoredFrames:
     turns = [image_size_and_turn(file)[1] for file in photographs.color]
     rotations = np.array([stored_from_upright(turn) for turn in turns])
     return ScoredFrames(
-        split="all",
+        split=UNSPLIT,
         names=tuple(frame.name for frame in frames),
         world_from_cam=photographs.world_from_cam,
         path=path,

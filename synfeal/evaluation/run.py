@@ -23,7 +23,7 @@ from synfeal.evaluation.bootstrap import FEWEST_PATHS
 from synfeal.evaluation.captured import captured_frames
 from synfeal.evaluation.coverage import Coverage, coverage
 from synfeal.evaluation.estimates import checked_convention
-from synfeal.evaluation.frames import ScoredFrames, match, read_scored_frames
+from synfeal.evaluation.frames import UNSPLIT, ScoredFrames, match, read_scored_frames
 from synfeal.evaluation.metrics import MEANS, ORIENTATION, POSITION, Metrics, pose_errors, summary
 from synfeal.evaluation.reference import (
     MOST_APART_S,
@@ -123,6 +123,9 @@ def evaluate(dataset: Path, poses: Path, settings: Settings) -> Evaluation:
         frames, row = met_in_time(frames, estimates, poses, clock)
     else:
         row = _matched(frames, estimates, poses, settings)
+        if frames.split == UNSPLIT and estimates.names_all_asked:
+            # Some of the photographs were kept aside, and nothing was asked of the others.
+            frames, row = frames.at(np.flatnonzero(row >= 0)), row[row >= 0]
     frames = _turned_as_estimated(frames, estimates, row, settings)
     convention, predicted = _taken(poses, frames, estimates, row, settings, settings.convention)
     yardsticks = {DATASET: frames.world_from_cam}

@@ -129,6 +129,8 @@ def _findings(poses: Path, settings: Settings, found: Evaluation) -> list[str]:
         lines.append(
             f"{found.frames.n_left_out} poses of the reference have no estimate within"
             f" {settings.most_apart_s:g} s and are left out"
+            if found.frames.frame_key == "time"
+            else f"{found.frames.n_left_out} further photographs are not in {poses} and left out"
         )
     names = np.array(found.frames.names)
     lines += _some("without a pose, which counts as a failure", names[~there])

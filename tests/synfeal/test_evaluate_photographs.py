@@ -6,6 +6,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from synfeal.evaluation.run import Settings, evaluate
+from synfeal.evaluation.text import report_text
 from tests.support.collected import refused
 
 NUMBERS = (3, 4, 5, 9)
@@ -93,3 +94,21 @@ def test_a_tum_sequence_without_images_is_named(tmp_path, capfd):
         (tmp_path / name).write_text("# empty\n")
     poses = write_estimates(tmp_path / "poses.csv", [("frame-000003.color.jpg", 3)])
     assert "rgb.txt: lists no images" in refused(capfd, "evaluate", tmp_path, poses)
+
+
+def test_photographs_that_localize_was_not_asked_about_are_left_out(tmp_path):
+    folder = tmp_path / "photos"
+    for number in NUMBERS:
+        write_photograph(folder, number, pose_of(number))
+    names = [(f"frame-{number:06d}.color.jpg", number) for number in NUMBERS[:2]]
+    path = write_estimates(tmp_path / "poses.csv", names)
+    header, *rows = path.read_text().splitlines()
+    lost = f"frame-{NUMBERS[2]:06d}.color.jpg,,,,,,,,not localized,0,0.0"
+    rows = [f"{row},localized,40,1.0" for row in rows]
+    path.write_text("\n".join([f"{header},status,inliers,confidence", *rows, lost]) + "\n")
+    found = evaluate(folder, path, Settings())
+    assert [name[-6:] for name in found.frames.names] == [f"{n:06d}" for n in NUMBERS[:3]]
+    assert found.frames.n_left_out == 1
+    errors = found.errors["position_m"]
+    np.testing.assert_allclose(errors, [OFF_M, OFF_M, np.inf], atol=1e-9)
+    assert "1 further photographs are not in" in report_text(path, Settings(), found)
