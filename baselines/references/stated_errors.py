@@ -12,7 +12,10 @@ ECML 2002; Lei et al., JASA 2018).
 
 The trial knows the errors of matching in the map, not those of the capture that it was built from.
 Photographs of known pose, which the capture of a place has, are therefore a second trial, and the
-wider of both radii is stated.
+wider of both radii is stated. These photographs are few, those of one stretch of the walk are off
+alike, and their poses are wrong like those of the photographs beside them, which the scan was
+coloured by. So their factors are tolerance limits (Wilks, Annals of Mathematical Statistics 1941),
+which hold the share of new poses with 90 % confidence and not only on average.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ import torch
 from numpy.typing import NDArray
 from PIL import Image
 from pydantic import ValidationError, model_validator
+from scipy.special import bdtr
 
 from baselines.references.confidence import LEAST_CONFIDENCE
 from baselines.references.map_frames import MapFrames
@@ -54,6 +58,11 @@ TRIED = 100  # frames of the map
 LEFT_OUT = 0.02
 # Poses found. With fewer than 19, no rank holds 95 % of new ones.
 FEWEST = 24
+# With which radii that photographs of a capture widen hold at least the share that they state.
+CONFIDENCE = 0.9
+# Times the median ratio of error and spread: beyond, a pose is of another place that looks alike.
+# No radius holds those, and a limit near the largest ratio must not be theirs.
+OF_ANOTHER_PLACE = 10.0
 # Ranges of a photograph as large as the map's frames; those of training are for images of 64
 # pixels.
 PHOTOGRAPHIC = PhotometricConfig(
@@ -133,13 +142,14 @@ class ErrorScale:
     """
 
     def __init__(self, trial: Trial) -> None:
-        tried: list[Poses] = [trial]
-        if trial.photographs is not None and len(trial.photographs.position_m) >= FEWEST:
-            tried.append(trial.photographs)
-        position = [_factors(one.position_m, one.position_spread_m) for one in tried]
-        orientation = [_factors(one.orientation_deg, one.orientation_spread_deg) for one in tried]
-        self._position = np.max(position, axis=0)
-        self._orientation = np.max(orientation, axis=0)
+        self._position = np.array(_factors(trial.position_m, trial.position_spread_m))
+        self._orientation = np.array(_factors(trial.orientation_deg, trial.orientation_spread_deg))
+        seen = trial.photographs
+        if seen is not None and len(seen.position_m) >= FEWEST:
+            position = _sure_factors(seen.position_m, seen.position_spread_m)
+            orientation = _sure_factors(seen.orientation_deg, seen.orientation_spread_deg)
+            self._position = np.maximum(self._position, position)
+            self._orientation = np.maximum(self._orientation, orientation)
 
     def stated(self, spread: Spread) -> Stated:
         """Return the radii of a pose of this spread."""
@@ -157,6 +167,23 @@ def _factors(errors: tuple[float, ...], spreads: tuple[float, ...]) -> list[floa
     ratios = np.sort(np.array(errors) / np.array(spreads))
     ranks = (math.ceil((len(ratios) + 1) * level) for level in (SD_LEVEL, WIDE_LEVEL))
     return [float(ratios[min(rank, len(ratios)) - 1]) for rank in ranks]
+
+
+def _sure_factors(errors: tuple[float, ...], spreads: tuple[float, ...]) -> Array:
+    """Compute ratios (2,) that hold 68 and 95 % of new poses with ``CONFIDENCE``.
+
+    Where there are too few poses for that, the largest ratio of a pose of this place stands in.
+    """
+    ratios = np.sort(np.array(errors) / np.array(spreads))
+    ratios = ratios[ratios <= OF_ANOTHER_PLACE * np.median(ratios)]
+    count = len(ratios)
+    # The r-th of n ratios holds less than a share p if at least r of n lie within it.
+    ranks = np.arange(1, count + 1)
+    limits = []
+    for level in (SD_LEVEL, WIDE_LEVEL):
+        is_sure = bdtr(ranks - 1, count, level) >= CONFIDENCE
+        limits.append(ratios[np.argmax(is_sure)] if is_sure.any() else ratios[-1])
+    return np.maximum(limits, _factors(errors, spreads))
 
 
 def held_out_coverage(tried: Poses) -> dict[str, list[Coverage]]:
