@@ -29,7 +29,10 @@ POSE = ["tx", "ty", "tz", "qw", "qx", "qy", "qz"]
 CLOSE_M, CLOSE_DEG = 0.05, 5.0
 # A pose that is farther off is of another place that looks alike.
 WRONG_M = 0.5
-HEADER = "| place | photographs | localized | error (median) | within 5 cm, 5° | off by more than 50 cm |"
+HEADER = (
+    "| place | photographs | localized | error (median) | within 5 cm, 5°"
+    " | off by more than 50 cm |"
+)
 COVERAGE_HEADER = "| | 50 % | 68 % | 80 % | 90 % | 95 % | 99 % | 95 % radius (median) |"
 
 
