@@ -148,7 +148,7 @@ class MapLocalizer:
         """State the error of a pose; None where nothing bounds it."""
         if self._scale is None or answer.spread is None or not np.isfinite(answer.spread).all():
             return None
-        return self._scale.stated(answer.spread)
+        return self._scale.stated(answer.spread) if self._scale.knows(answer.spread) else None
 
     def _status_of(self, answer: Answer) -> Status:
         if answer.support.confidence < self._least_confidence:

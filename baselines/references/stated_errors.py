@@ -63,6 +63,8 @@ CONFIDENCE = 0.9
 # Times the median ratio of error and spread: beyond, a pose is of another place that looks alike.
 # No radius holds those, and a limit near the largest ratio must not be theirs.
 OF_ANOTHER_PLACE = 10.0
+# Times the largest spread that was tried: of poses beyond, nothing is known.
+BEYOND = 2.0
 # Ranges of a photograph as large as the map's frames; those of training are for images of 64
 # pixels.
 PHOTOGRAPHIC = PhotometricConfig(
@@ -142,6 +144,9 @@ class ErrorScale:
     """
 
     def __init__(self, trial: Trial) -> None:
+        # What the trial's frames alone say of the photographs that are the second trial has to hold
+        # for these, whatever their spread.
+        self._farthest = Spread(math.inf, math.inf)
         self._position = np.array(_factors(trial.position_m, trial.position_spread_m))
         self._orientation = np.array(_factors(trial.orientation_deg, trial.orientation_spread_deg))
         seen = trial.photographs
@@ -150,6 +155,15 @@ class ErrorScale:
             orientation = _sure_factors(seen.orientation_deg, seen.orientation_spread_deg)
             self._position = np.maximum(self._position, position)
             self._orientation = np.maximum(self._orientation, orientation)
+            self._farthest = _farthest((trial, seen))
+
+    def knows(self, spread: Spread) -> bool:
+        """Tell whether poses about as uncertain as this were tried.
+
+        Others rest on fewer or nearer matches than any that the place's photographs have: they may
+        be of what it does not show, and match things that only look alike.
+        """
+        return all(own <= most for own, most in zip(spread, self._farthest, strict=True))
 
     def stated(self, spread: Spread) -> Stated:
         """Return the radii of a pose of this spread."""
@@ -160,6 +174,23 @@ class ErrorScale:
     def spreads(self, stated: Array) -> tuple[Array, Array]:
         """Return the spreads (N,) of position and orientation of poses that state radii (N, 4)."""
         return stated[:, 1] / self._position[1], stated[:, 3] / self._orientation[1]
+
+
+def _farthest(tried: tuple[Poses, ...]) -> Spread:
+    """Find the largest spread about which poses that were tried say something."""
+    columns = [
+        [(one.position_m, one.position_spread_m) for one in tried],
+        [(one.orientation_deg, one.orientation_spread_deg) for one in tried],
+    ]
+    largest = []
+    for pairs in columns:
+        of_this_place = []
+        for errors, spreads in pairs:
+            spread = np.array(spreads)
+            ratio = np.array(errors) / spread
+            of_this_place.append(spread[ratio <= OF_ANOTHER_PLACE * np.median(ratio)].max())
+        largest.append(BEYOND * max(of_this_place))
+    return Spread(*largest)
 
 
 def _factors(errors: tuple[float, ...], spreads: tuple[float, ...]) -> list[float]:

@@ -125,6 +125,22 @@ def test_a_photograph_at_another_place_widens_no_radius():
     assert (with_one <= 1.3 * usual).all()
 
 
+def test_what_is_far_less_certain_than_anything_tried_has_no_stated_error():
+    """Spreads that were tried reach to 0.1 m and 2 degrees."""
+    seen = drawn(normal, 60, 3)
+    scale = scale_with_photographs(seen)
+    assert scale.knows(Spread(0.15, 3.0))
+    assert not scale.knows(Spread(0.25, 0.5))
+    assert not scale.knows(Spread(0.01, 5.0))
+    # A pose of another place that is as uncertain teaches nothing of such.
+    values = seen.model_dump()
+    values["position_m"] = [100.0, *values["position_m"][1:]]
+    values["position_spread_m"] = [0.3, *values["position_spread_m"][1:]]
+    assert not scale_with_photographs(Trial(**values)).knows(Spread(0.25, 0.5))
+    # Renderings alone must judge photographs of whatever spread.
+    assert ErrorScale(seen).knows(Spread(1.0, 50.0))
+
+
 def test_photographs_are_added_with_the_spreads_that_their_radii_come_from(copied):
     """Radii of the trial's frames, of poses that are all off by twice their 95 % radius."""
     folder = copied / "map"
