@@ -31,7 +31,7 @@ CLOSE_M, CLOSE_DEG = 0.05, 5.0
 WRONG_M = 0.5
 HEADER = (
     "| place | photographs | localized | error (median) | within 5 cm, 5°"
-    " | off by more than 50 cm |"
+    " | off by more than 50 cm | of these with a stated error |"
 )
 COVERAGE_HEADER = "| | 50 % | 68 % | 80 % | 90 % | 95 % | 99 % | 95 % radius (median) |"
 
@@ -62,15 +62,19 @@ def measured(place: str, capture: Path, poses: Path) -> pd.DataFrame:
     """
     frames = captured_frames(capture, read_pose_list(poses), poses)
     found = pd.read_csv(poses).set_index(IMAGE).loc[list(frames.names)]
-    answers = pose_from_quat(found[POSE[:3]].to_numpy(), found[POSE[3:]].to_numpy())
-    error_m, error_rad = pose_error(answers, frames.world_from_cam)
+    localized = (found["status"] == FOUND).to_numpy()
+    values = found.loc[localized, POSE].to_numpy()
+    answers = pose_from_quat(values[:, :3], values[:, 3:])
+    error_m, error_deg = np.full((2, len(found)), np.nan)
+    error_m[localized], error_rad = pose_error(answers, frames.world_from_cam[localized])
+    error_deg[localized] = np.degrees(error_rad)
     return pd.DataFrame(
         {
             "place": place,
             "photograph": [Path(name).name for name in frames.names],
             "status": found["status"].to_numpy(),
             POSITION: error_m,
-            ORIENTATION: np.degrees(error_rad),
+            ORIENTATION: error_deg,
             **{name: found[name].to_numpy() for name in STATED},
         }
     )
@@ -78,22 +82,24 @@ def measured(place: str, capture: Path, poses: Path) -> pd.DataFrame:
 
 def summary(table: pd.DataFrame) -> str:
     """Write what the photographs of each place come to, as two tables in Markdown."""
-    lines = [HEADER, "|---" * 6 + "|"]
+    lines = [HEADER, "|---" * 7 + "|"]
     held = [COVERAGE_HEADER, "|---" * 8 + "|"]
     for place, rows in table.groupby("place"):
         found = rows[rows["status"] == FOUND]
         error_m, error_deg = found[POSITION].to_numpy(), found[ORIENTATION].to_numpy()
+        states = np.isfinite(found[list(STATED)].to_numpy()).all(axis=1)
+        is_wrong = error_m > WRONG_M
         close = np.sum((error_m <= CLOSE_M) & (error_deg <= CLOSE_DEG))
         lines.append(
             f"| {place} | {len(rows)} | {len(found)} | {100 * np.median(error_m):.1f} cm /"
             f" {np.median(error_deg):.2f}° | {close / len(rows):.0%} |"
-            f" {np.sum(error_m > WRONG_M)} |".replace("%", " %")
+            f" {is_wrong.sum()} | {(is_wrong & states).sum()} |".replace("%", " %")
         )
         for name, error, radii, unit, scale in (
             ("position", error_m, STATED[:2], "cm", 100.0),
             ("orientation", error_deg, STATED[2:], "°", 1.0),
         ):
-            levels = coverage(error, *(found[radius].to_numpy() for radius in radii))
+            levels = coverage(error[states], *found.loc[states, list(radii)].to_numpy().T)
             cells = " | ".join(f"{100 * one.held:.0f} % ({one.width:.2f})" for one in levels)
             middle = f"{scale * found[radii[1]].median():.1f} {unit}".replace(" °", "°")
             held.append(f"| {place}, {name} | {cells} | {middle} |")
