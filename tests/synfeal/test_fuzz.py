@@ -120,7 +120,17 @@ def test_every_key_takes_a_right_value_or_none(profile, monkeypatch):
 
 
 # Of cameras that a perspective one without calibration excludes, and what null leaves out.
-LEFT_OUT = {"calibration", "projection", "fisheye_k", "stereo_baseline_m", "test_paths", "shade"}
+LEFT_OUT = {
+    "calibration",
+    "projection",
+    "fisheye_k",
+    "stereo_baseline_m",
+    "depth_units_per_m",
+    "test_paths",
+    "around_m",
+    "around_turn_deg",
+    "shade",
+}
 
 
 def test_no_model_was_left_out():
