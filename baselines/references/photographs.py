@@ -231,7 +231,8 @@ class Finder:
         frames = self.alike(matched.photograph, among)
         matches = matched.with_frames(frames)
         first = self._agreed(matches)
-        by_frame = [self._agreed(matched.with_frames([frame])) for frame in frames]
+        alone = [matched.with_frames([frame]) for frame in frames]
+        by_frame = [self._agreed(own) for own in alone if not self._explained(own, first)]
         poses = [attempt.world_from_cam for attempt in by_frame if attempt is not None]
         others = [self._supported(matches, pose) for pose in poses]
         others = [other for other in others if other.support.confidence >= LEAST_CONFIDENCE]
@@ -241,6 +242,13 @@ class Finder:
             if all(_are_apart(other.world_from_cam, known.world_from_cam) for known in found):
                 found.append(other)
         return found[:MOST_PLACES]
+
+    def _explained(self, matches: _Matches, first: _Attempt | None) -> bool:
+        """Tell whether half of the matches agree with a pose: no other one has more of them."""
+        if first is None:
+            return False
+        agreeing = int(self._inliers(matches, first.world_from_cam).sum())
+        return 2 * agreeing >= len(matches.own)
 
     def _with_look_alikes(
         self, matched: _Matched, places: list[_Attempt], among: Rows
