@@ -23,6 +23,18 @@ def test_the_page_of_places_shows_what_the_table_comes_to(table):
         assert line in page
 
 
+def test_the_readme_tells_the_same(table):
+    readme = (ROOT / "README.md").read_text()
+    errors_cm, held = [], []
+    for place in ("corridor", "freiburg1_rpy", "RedKitchen"):
+        found = table[(table.place == place) & (table.status == "localized")]
+        errors_cm.append(f"{100 * found[POSITION].median():.1f}")
+        stated = found[found["position_95_m"].notna()]
+        held.append(f"{100 * (stated[POSITION] <= stated['position_95_m']).mean():.0f}")
+    assert "{}, {} and {} cm off".format(*errors_cm) in readme
+    assert "hold {}, {} and {} %".format(*held) in readme
+
+
 def test_a_summary_in_closed_form():
     """Errors of 1 to 10 cm, stated to be within 9 cm in 95 of 100 cases; one lost, two wrong."""
     found = pd.DataFrame(
