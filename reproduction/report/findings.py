@@ -292,9 +292,9 @@ def shared_errors_stay(root: Path) -> Finding | None:
         f" the five networks, by {', '.join(parts[:-1])}, and {parts[-1]}.",
         "the truth",
         SHAPE_CHANGES if _has_by_frame(root) else SHAPES_ROWS,
-        f"Labels {_noise(off_in_all_shapes(root))} off change the networks' orientation error by"
-        f" {change_text(own.value)} if every frame has its own error, by"
-        f" {change_text(space.value)} if all share one smooth distortion of space.",
+        f"Labels {_noise(off_in_all_shapes(root))} off change the networks' orientation error"
+        f" against the true poses by {change_text(own.value)} if every frame has an error of its"
+        f" own, by {change_text(space.value)} if one smooth distortion of space moves them all.",
     )
 
 
@@ -436,8 +436,8 @@ def frames_and_images(root: Path, controls: Path) -> Finding | None:
         "labels and truth alike",
         "table4_size",
         f"From {SMALL} to {LARGE} frames the position error changes by"
-        f" {change_text(whole[0].value)}, and by {change_text(frames[0].value)} where no more"
-        " images are shown.",
+        f" {change_text(whole[0].value)}, by {change_text(frames[0].value)} if the larger set is"
+        " shown as few images as the smaller.",
         controls.name,
     )
 
@@ -514,9 +514,10 @@ def no_difference_at_this_dose(root: Path) -> Finding | None:
         f" and {percent(single[1])} {_printed(*posenet2)}.{failing}",
         "the truth",
         "table2_ground_truth",
-        f"Labels of SfM and RGB-D SLAM are {_ends(100 * own.position_m_median[[*names]])} cm off in"
-        f" the median, the networks {_ends(errors_m, 0)} cm: exact labels change the networks'"
-        f" mean errors by {largest:.0f} % at most.",
+        "Labels that SfM and RGB-D SLAM find in these renderings are"
+        f" {_ends(100 * own.position_m_median[[*names]])} cm off in the median, the networks"
+        f" {_ends(errors_m, 0)} cm: exact labels change the networks' mean errors by"
+        f" {largest:.0f} % at most.",
         _told_by(root, asked),
     )
 

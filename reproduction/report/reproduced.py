@@ -153,7 +153,8 @@ def _start(root: Path) -> str:
             texts.append(f"{low} to {high} at {size}")
     return (
         f"**Undecided: transfer learning.** {row['measured_true'].capitalize()} at 6k and 20k"
-        f" frames (paper: 20 of 20); mean change in position, 95 % limits: {', '.join(texts)}."
+        " frames, both errors of five networks (paper: 20 of 20); a start from scratch changes the"
+        f" position error, mean of the five, by {', '.join(texts)}."
     )
 
 

@@ -25,13 +25,17 @@ def test_the_page_of_places_shows_what_the_table_comes_to(table):
 
 def test_the_readme_tells_the_same(table):
     readme = (ROOT / "README.md").read_text()
-    errors_cm, held = [], []
+    errors_cm, held, counts, angles_deg = [], [], [], []
     for place in ("corridor", "freiburg1_rpy", "RedKitchen"):
         found = table[(table.place == place) & (table.status == "localized")]
         errors_cm.append(f"{100 * found[POSITION].median():.1f}")
+        counts.append(len(found))
+        angles_deg.append(found[ORIENTATION].median())
         stated = found[found["position_95_m"].notna()]
         held.append(f"{100 * (stated[POSITION] <= stated['position_95_m']).mean():.0f}")
     assert "{}, {} and {} cm off".format(*errors_cm) in readme
+    ends = f"{min(angles_deg):.1f} to {max(angles_deg):.1f}°"
+    assert "(medians of {}, {} and {}; {})".format(*counts, ends) in readme
     assert "hold {}, {} and {} %".format(*held) in readme
 
 
