@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import shlex
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -217,9 +216,8 @@ def _refuse_without_depth(job: PlaceJob, capture: Capture) -> None:
         raise InputError(
             job.source,
             "has no depth, of which a scan is made",
-            f"make a map of its photographs alone, synfeal map {shlex.quote(str(job.source))}"
-            " --out map, and localize in that; or give a textured mesh of the place that another"
-            " program made",
+            "make a map of its photographs alone (synfeal map) and localize in that, or give a"
+            " textured mesh of the place that another program made",
         )
 
 

@@ -92,8 +92,8 @@ def is_capture(path: Path, besides: Collection[str] = ()) -> bool:
 
 
 def may_be_capture(path: Path) -> bool:
-    """Tell whether a path that may be a mesh is a capture or, being a folder, no mesh."""
-    return path.is_dir() or is_capture(path)
+    """Tell whether a path that may be a mesh is a capture, or holds pictures that may be one."""
+    return is_capture(path) or bool(_held(path))
 
 
 def format_of(path: Path) -> CaptureFormat:

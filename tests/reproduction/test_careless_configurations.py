@@ -23,7 +23,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 TABLE = (
     # unknown keys, and keys at the wrong place
     ("profle: mine", "profle: unknown key; allowed here: archive_sequences, collection, dataset"),
-    ("collection: {spacing: 0.1}", "collection.spacing: unknown key; allowed here: candidates"),
+    ("collection: {spacing: 0.1}", "collection.spacing: unknown key; allowed here: around_m"),
     ("scenes: {large_room: {colour: red}}", "scenes.large_room.colour: unknown key"),
     ('"": 1', "'': unknown key"),
     ("null: 2", "None: keys must be text"),

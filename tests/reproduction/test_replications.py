@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 from reproduction.claims.evidence import COMMON, Cell
 from reproduction.config.load import load_config
@@ -32,8 +33,9 @@ from reproduction.replications.effects import (
     printed_effects,
 )
 from reproduction.replications.pooling import CLAIMS, EFFECTS, POOLED, write_pooled
+from reproduction.report.forest import EFFECTS_SCHEMA, PICTURE, main, rows_in
 from synfeal.errors import InputError
-from synfeal.records.tables import write_frame
+from synfeal.records.tables import read_frame, write_frame
 from tests.support import claims_results
 
 N_FRAMES, N_PATHS = 240, 40
@@ -104,6 +106,27 @@ def pooled(tmp_path_factory):
     root = tmp_path_factory.mktemp("replications")
     write_pooled([write_replication(root / str(seed), seed) for seed in (101, 102, 103)], root)
     return root
+
+
+def test_the_forest_plot_shows_the_factors_and_the_nearest_rival(pooled):
+    assert main([str(pooled)]) == 0
+    with Image.open(pooled / PICTURE) as picture:
+        assert min(picture.size) > 500
+    rows = {(row.claim, row.label): row for row in rows_in(read_effects(pooled), "percent")}
+    row = rows["C7", "80k, not 6k, position"]
+    assert row.pooled[0] == pytest.approx(-50, abs=0.1)
+    assert len(row.single) == 3
+    assert row.printed < 0
+    # PoseNet2 from scratch at 80k has 0.8 times the error of the other networks there, and less
+    # than that of anything else: one row stands for its 29 rivals.
+    (best,) = (row for row in rows.values() if row.claim == "C12")
+    assert best.label.endswith(", scratch, 80k, position")
+    assert best.pooled[0] == pytest.approx(-20, abs=0.1)
+    assert not any(claim == "networks" for claim, _ in rows)
+
+
+def read_effects(folder):
+    return read_frame(folder / EFFECTS, EFFECTS_SCHEMA)
 
 
 def test_effects_are_the_factors_that_errors_were_made_with(pooled):

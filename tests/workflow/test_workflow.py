@@ -103,7 +103,7 @@ def test_the_record_of_a_run_reads_what_every_job_took_and_all_asks_every_job_fo
 def test_jobs_that_train_and_draw_share_the_card_of_this_machine(smoke_jobs):
     asked = {job["rule"]: job["gpu_percent"] for job in smoke_jobs if job["gpu_percent"]}
     assert asked == {
-        **dict.fromkeys(("pretrain", "train", "train_varied"), 25),  # four at a time
+        **dict.fromkeys(("pretrain", "train", "train_varied"), 50),  # two at a time
         **dict.fromkeys(("render", "render_packed", "render_varied"), 7),  # fourteen
     }
 
