@@ -9,8 +9,9 @@
 # Frames are those of `night` (Large Room, 6k), drawn here. Structure's errors on the same data set
 # are in results/published/night/tables/references.csv. Stages that have no time left are cut, and
 # what they had measured is kept.
-# PYTHON names another interpreter. PLANNED=OUT/labels, written by `python -m benchmarks.gpu_frames
-# plan OUT` elsewhere, serves machines without Open3D. SCALE=toy DEVICE=cpu PROFILE=FILE tries it without a GPU.
+# PYTHON names another interpreter, MOST_S other seconds in all. PLANNED=OUT/labels, written by
+# `python -m benchmarks.gpu_frames plan OUT` elsewhere, serves machines without Open3D.
+# SCALE=toy DEVICE=cpu PROFILE=FILE tries it without a GPU.
 set -uo pipefail
 out=${1:?name a directory to write to}
 python=${PYTHON:-python}

@@ -29,12 +29,18 @@ from baselines.references.features import roots_of
 from baselines.references.mapped import VIEW_PX, StructureMap, detect, detector
 from baselines.references.pose_covariance import Spread, pose_covariance, spread_of
 from baselines.references.repeats import MAX_ERROR_PX, METRES_PER_RADIAN, RATIO
-from baselines.references.structure import pinhole, refined_focal_px, refined_pose, supported_pose
+from baselines.references.structure import (
+    missed_px,
+    pinhole,
+    refined_focal_px,
+    refined_pose,
+    supported_pose,
+)
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.distortion import distort, undistort
 from synfeal.camera.projection import cell_centres_px, normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
-from synfeal.geometry.poses import inverse, pose_error
+from synfeal.geometry.poses import pose_error
 from synfeal.geometry.rotations import quat_wxyz_from_matrix
 
 Array = NDArray[np.float64]
@@ -212,12 +218,12 @@ class Finder:
         same points, or on points that the best pose misses by little.
         """
         matches, inlier = attempt.matches, attempt.inlier
-        missed_px = self._missed_px(matches, best.world_from_cam)[inlier]
+        off_px = self._missed_px(matches, best.world_from_cam)[inlier]
         own, point_m = matches.own[inlier], matches.point_m[inlier]
         other = best.mean_points_m(own)
         apart_m = np.linalg.norm(point_m - other, axis=1)
         is_elsewhere = np.where(
-            np.isfinite(apart_m), apart_m > APART_M, missed_px > ROUGHLY * MAX_ERROR_PX
+            np.isfinite(apart_m), apart_m > APART_M, off_px > ROUGHLY * MAX_ERROR_PX
         )
         return len(np.unique(own[is_elsewhere]))
 
@@ -353,12 +359,7 @@ class Finder:
 
     def _missed_px(self, matches: _Matches, world_from_cam: Array) -> Array:
         """Compute by how much a pose (4, 4) misses matches (m,); infinity behind the camera."""
-        cam_from_world = inverse(world_from_cam)
-        in_cam_m = matches.point_m @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            seen = in_cam_m[:, :2] / in_cam_m[:, 2:] * self._focal_px
-            missed_px = np.linalg.norm(seen - matches.pixel, axis=1)
-        return np.where(in_cam_m[:, 2] > 0, missed_px, np.inf)
+        return missed_px(matches.pixel, matches.point_m, world_from_cam, self._focal_px)
 
     def _spread(self, attempt: _Attempt) -> Spread:
         """Say how exact a pose is by the matches that agree with it."""

@@ -20,9 +20,9 @@ from baselines.references.arrays import Stored, Vectors
 from baselines.references.confidence import LEAST_CONFIDENCE, support_of
 from baselines.references.correspondences import mutual_matches
 from baselines.references.features import Features
-from baselines.references.structure import pinhole, supported_pose
+from baselines.references.structure import missed_px, pinhole, supported_pose
 from synfeal.config.dataset import CameraConfig
-from synfeal.geometry.poses import inverse
+from synfeal.geometry.poses import inverse, pose_error
 from synfeal.records.progress import Progress
 
 Array = NDArray[np.float64]
@@ -86,7 +86,7 @@ class Repeats(Stored):
         Returns:
             Poses (P, 4, 4).
         """
-        distance_m, angle_rad = _apart(frames[self.searched], world_from_cam)
+        distance_m, angle_rad = pose_error(frames[self.searched], world_from_cam)
         order = np.argsort(distance_m + METRES_PER_RADIAN * angle_rad, kind="stable")
         nearest = self.searched[order[:NEAREST]]
         row = np.flatnonzero(np.isin(self.frame, nearest))
@@ -163,7 +163,7 @@ def _look_alike(shown: PosedFeatures, row: int, other: int, seed: int) -> tuple[
     focal_px = np.array(camera.intrinsics[:2])
     pixel = features.slope[features.of(row)][own] * focal_px
     point_m = shown.point_m[features.of(other)][match]
-    is_other = ~_shows(pixel, point_m, shown.world_from_cam[row], focal_px)
+    is_other = missed_px(pixel, point_m, shown.world_from_cam[row], focal_px) >= SAME_PX
     if is_other.sum() < FEWEST:
         return None
     pixel, point_m = pixel[is_other], point_m[is_other]
@@ -181,26 +181,7 @@ def _look_alike(shown: PosedFeatures, row: int, other: int, seed: int) -> tuple[
     return (found.world_from_cam, support.inliers) if is_sure else None
 
 
-def _shows(
-    pixel: Array, point_m: Array, world_from_cam: Array, focal_px: Array
-) -> NDArray[np.bool_]:
-    """Mark the points (m, 3) that a pose shows within ``SAME_PX`` of their pixels (m, 2)."""
-    cam_from_world = inverse(world_from_cam)
-    in_cam_m = point_m @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        seen = in_cam_m[:, :2] / in_cam_m[:, 2:] * focal_px
-        missed_px = np.linalg.norm(seen - pixel, axis=1)
-    return np.asarray((in_cam_m[:, 2] > 0) & (missed_px < SAME_PX))
-
-
 def _near(frames: Array, world_from_cam: Array) -> NDArray[np.bool_]:
     """Mark the poses (N, 4, 4) that see what another one (4, 4) sees."""
-    distance_m, angle_rad = _apart(frames, world_from_cam)
+    distance_m, angle_rad = pose_error(frames, world_from_cam)
     return np.asarray((distance_m < NEAR_M) & (angle_rad < NEAR_RAD))
-
-
-def _apart(frames: Array, world_from_cam: Array) -> tuple[Array, Array]:
-    """Return distances (N,), metres, and angles (N,), radians, of poses (N, 4, 4) to one (4, 4)."""
-    distance_m = np.linalg.norm(frames[:, :3, 3] - world_from_cam[:3, 3], axis=1)
-    trace = np.einsum("nij,ij->n", frames[:, :3, :3], world_from_cam[:3, :3])
-    return distance_m, np.arccos(np.clip((trace - 1) / 2, -1, 1))

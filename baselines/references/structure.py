@@ -196,6 +196,26 @@ def refined_focal_px(
     return float("nan") if found is None else float(free.params[0])
 
 
+def missed_px(pixel: Array, point_m: Array, world_from_cam: Array, focal_px: Array) -> Array:
+    """Compute by how much a pose misses matches; infinity behind the camera.
+
+    Args:
+        pixel: Positions (m, 2) from the principal point.
+        point_m: Matched points (m, 3) in the world.
+        world_from_cam: Pose (4, 4).
+        focal_px: Focal lengths (2,).
+
+    Returns:
+        Distances (m,), pixels.
+    """
+    cam_from_world = inverse(world_from_cam)
+    in_cam_m = point_m @ cam_from_world[:3, :3].T + cam_from_world[:3, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seen = in_cam_m[:, :2] / in_cam_m[:, 2:] * focal_px
+        missed = np.linalg.norm(seen - pixel, axis=1)
+    return np.where(in_cam_m[:, 2] > 0, missed, np.inf)
+
+
 def pinhole(camera: CameraConfig) -> pycolmap.Camera:
     """Return a camera without distortion and with its principal point at (0, 0)."""
     fx, fy, _, _ = camera.intrinsics

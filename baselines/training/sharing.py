@@ -15,7 +15,7 @@ from baselines.training.memory import training_mb
 WHOLE = 100
 # Two runs of PoseNet2 (224 px, full width, batch 45) on one card learn from 1.3 times as many
 # images a second as one, four from no more than one (results/benchmarks/gpu.csv). A captured step
-# leaves a card little time: kernels fill 13.7 of its 14.2 ms.
+# leaves a card little time: kernels fill 13.7 of its 14.4 ms.
 RUNS_ON_A_CARD = 2
 # As many drew side by side, 8,500 frames of 320 x 240 in 17 s, on a card of 141 GB.
 RENDERERS_ON_A_CARD = 14

@@ -145,7 +145,7 @@ def forest_figure(
     heights = [len(changes) + 1.5, len(shares) + 1.5]
     figure = Figure(figsize=(9.5, ROW_INCHES * sum(heights) + 1.2), layout="constrained")
     above, below = figure.subplots(2, 1, height_ratios=heights)
-    _draw_rows(above, [_as_ratios(row) for row in changes], [row.label for row in changes])
+    _draw_rows(above, [_as_ratios(row) for row in changes])
     above.set_xscale("log")
     above.axvline(1, color="0.3", lw=0.8, zorder=0)
     above.set_xticks(
@@ -154,7 +154,7 @@ def forest_figure(
     )
     above.minorticks_off()
     above.set_xlabel("change (0: none; the axis is that of ratios)")
-    _draw_rows(below, shares, [row.label for row in shares])
+    _draw_rows(below, shares)
     below.set_xlim(0, 1)
     below.set_xlabel("share of batches that needed assistance")
     for axes, rows in ((above, changes), (below, shares)):
@@ -175,7 +175,7 @@ def _as_ratios(row: Row) -> Row:
     )
 
 
-def _draw_rows(axes: Axes, rows: Sequence[Row], labels: Sequence[str]) -> None:
+def _draw_rows(axes: Axes, rows: Sequence[Row]) -> None:
     for y, row in enumerate(rows):
         color = COLORS.get(row.quantity, GREEN)
         value, low, high = row.pooled
@@ -187,7 +187,7 @@ def _draw_rows(axes: Axes, rows: Sequence[Row], labels: Sequence[str]) -> None:
         if math.isfinite(row.printed):
             printed: Style = {"mfc": "white", "mec": "0.25", "mew": 1.1, "ms": 5.5, "zorder": 4}
             axes.plot(row.printed, y, "D", label="the paper", **printed)
-    axes.set_yticks(range(len(rows)), labels)
+    axes.set_yticks(range(len(rows)), [row.label for row in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="x", color="0.92")

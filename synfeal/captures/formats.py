@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from synfeal.captures.capture import Capture
+from synfeal.dataset.images import HEIF_SUFFIXES
 from synfeal.errors import Argument, InputError
 
 GROUP = "synfeal.captures"
+PICTURES = (".png", ".jpg", ".jpeg", *HEIF_SUFFIXES, ".ppm", ".tif", ".tiff")
+MOST_NAMED = 3  # folders of pictures, in a message
 OWN = (
     "tum",
     "seven_scenes",
@@ -115,14 +118,14 @@ def format_of(path: Path) -> CaptureFormat:
     return fitting[0]
 
 
-PICTURES = (".png", ".jpg", ".jpeg", ".heic", ".ppm", ".tif", ".tiff")
-
-
 def _held(path: Path) -> str:
     """Say that a folder holds pictures without the poses that make a capture of them."""
     if not path.is_dir():
         return ""
-    folders = [path, *sorted(inner for inner in path.iterdir() if inner.is_dir())]
+    try:
+        folders = [path, *sorted(inner for inner in path.iterdir() if inner.is_dir())]
+    except OSError:
+        return ""  # not to be looked into
     counts = {folder: _pictures(folder) for folder in folders}
     found = [f"{n} in {folder.name}" for folder, n in counts.items() if n > 1]
     if not found:
@@ -131,9 +134,6 @@ def _held(path: Path) -> str:
         f"holds pictures ({', '.join(found[:MOST_NAMED])}), but nothing known with their poses:"
         " estimate them first, for example with COLMAP, and give its model beside the pictures. It "
     )
-
-
-MOST_NAMED = 3
 
 
 def _pictures(folder: Path) -> int:

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from synfeal.errors import InputError
 from synfeal.planning.like import rpy_of
-from synfeal.planning.space import PoseSpace, PoseVectors
+from synfeal.planning.space import PoseSpace, PoseVectors, drawn_until
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ BLOCK = 4096  # candidates drawn at once
 
 
 class Reach(NamedTuple):
-    """How far a camera may be from the photograph that it is placed by.
+    """Farthest that a camera may be from the photograph that it is placed by.
 
     Attributes:
         radius_m: In position.
@@ -87,25 +87,24 @@ def poses_around(
         InputError: ``max_tries`` blocks in a row had no admissible pose.
     """
     positions = _Positions(photographs[:, :3, 3], reach.radius_m)
-    kept: list[PoseVectors] = []
-    n_kept = n_empty = 0
-    while n_kept < n_frames:
+
+    def draw() -> PoseVectors:
         place_m, by = positions.draw(BLOCK, space.rng)
         angles = rpy_of(_turned(photographs[by, :3, :3], reach.turn_deg, space.rng))
         anywhere = space.rng.random(len(by)) < LOOK_ANYWHERE
         angles[anywhere] = space.sample(len(by))[anywhere, 3:]
         poses = np.hstack([place_m, angles])[space.caster.sees(photographs[by, :3, 3], place_m)]
-        kept.append(poses[space.has_free_view(poses)])
-        n_kept += len(kept[-1])
-        n_empty = 0 if len(kept[-1]) else n_empty + 1
-        if n_empty >= max_tries:
-            raise InputError(
-                "plan",
-                f"no pose within {reach.radius_m:g} m of the photographs looks farther than"
-                f" `min_view_distance_m` ({space.min_view_distance_m} m){space.also_asked}",
-                "lower it, or check that the photographs are of this mesh",
-            )
-    return np.concatenate(kept)[:n_frames]
+        return poses[space.has_free_view(poses)]
+
+    def refusal(_: int) -> InputError:
+        return InputError(
+            "plan",
+            f"no pose within {reach.radius_m:g} m of the photographs looks farther than"
+            f" `min_view_distance_m` ({space.min_view_distance_m} m){space.also_asked}",
+            "lower it, or check that the photographs are of this mesh",
+        )
+
+    return drawn_until(n_frames, draw, max_tries, refusal)
 
 
 def _turned(rotation: Array, most_deg: float, rng: np.random.Generator) -> Array:

@@ -19,7 +19,13 @@ from synfeal.config.collection import CollectionConfig
 from synfeal.errors import InputError
 from synfeal.geometry.poses import interpolate, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
-from synfeal.planning.space import PoseSpace, PoseVectors, connected_space, farthest_admissible
+from synfeal.planning.space import (
+    PoseSpace,
+    PoseVectors,
+    connected_space,
+    drawn_until,
+    farthest_admissible,
+)
 
 Array = NDArray[np.float64]
 
@@ -172,19 +178,18 @@ def independent_poses(space: PoseSpace, collection: CollectionConfig, n_frames: 
     tries = collection.max_tries
     connected = connected_space(space, tries)
     most_empty = -(-tries * collection.candidates // BLOCK)
-    kept: list[PoseVectors] = []
-    n_kept = n_empty = 0
-    while n_kept < n_frames:
+
+    def draw() -> PoseVectors:
         poses = space.sample(BLOCK)
         poses = poses[space.has_free_view(poses)]
-        kept.append(poses[connected.contains(poses[:, :3])])
-        n_kept += len(kept[-1])
-        n_empty = 0 if len(kept[-1]) else n_empty + 1
-        if n_empty >= most_empty:
-            raise InputError(
-                "plan",
-                f"no admissible pose among {n_empty * BLOCK} candidates that looks farther than"
-                f" min_view_distance_m ({space.min_view_distance_m} m){space.also_asked}",
-                "lower it, or widen the box",
-            )
-    return np.concatenate(kept)[:n_frames]
+        return poses[connected.contains(poses[:, :3])]
+
+    def refusal(n_empty: int) -> InputError:
+        return InputError(
+            "plan",
+            f"no admissible pose among {n_empty * BLOCK} candidates that looks farther than"
+            f" min_view_distance_m ({space.min_view_distance_m} m){space.also_asked}",
+            "lower it, or widen the box",
+        )
+
+    return drawn_until(n_frames, draw, most_empty, refusal)

@@ -44,6 +44,34 @@ def sample_poses(bounds: Array, count: int, rng: np.random.Generator) -> PoseVec
     return rng.uniform(bounds[0], bounds[1], (count, 6))
 
 
+def drawn_until(
+    n_frames: int,
+    draw: Callable[[], PoseVectors],
+    most_empty: int,
+    refusal: Callable[[int], InputError],
+) -> PoseVectors:
+    """Draw admissible poses block by block; fewer of them are a prefix of more.
+
+    Args:
+        n_frames: Number of poses.
+        draw: Draws a block of candidates, and returns those that are admissible (n, 6).
+        most_empty: Blocks in a row without any, from which it gives up.
+        refusal: What to raise then, by the number of these blocks.
+
+    Returns:
+        Pose vectors (n_frames, 6).
+    """
+    kept: list[PoseVectors] = []
+    n_kept = n_empty = 0
+    while n_kept < n_frames:
+        kept.append(draw())
+        n_kept += len(kept[-1])
+        n_empty = 0 if len(kept[-1]) else n_empty + 1
+        if n_empty >= most_empty:
+            raise refusal(n_empty)
+    return np.concatenate(kept)[:n_frames]
+
+
 def view_directions(poses: PoseVectors) -> Array:
     """Compute unit vectors (N, 3) along the optical axes of pose vectors (N, 6), world.
 
