@@ -63,6 +63,8 @@ COLMAP_FISHEYE = {
     "RADIAL_FISHEYE": ("f", "cx", "cy", "k1", "k2"),
     "OPENCV_FISHEYE": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
 }
+# The fisheye model of transforms.json, whose other models are COLMAP's perspective ones.
+TRANSFORMS_FISHEYE = "OPENCV_FISHEYE"
 
 YAML_SUFFIXES = (".yaml", ".yml")
 UNKNOWN = (
@@ -245,7 +247,7 @@ def _from_record(values: Any) -> Calibration | None:
     if "fx" not in camera:
         return None
     is_fisheye = camera.get("projection") == "fisheye"
-    fx, fy, cx, cy = (_numbers(camera, (name,), (1,))[0] for name in ("fx", "fy", "cx", "cy"))
+    fx, fy, cx, cy = (_number(camera, name) for name in ("fx", "fy", "cx", "cy"))
     width, height = _size(camera, ("width", "height"))
     return Calibration(
         width=width,
@@ -261,26 +263,85 @@ def _from_record(values: Any) -> Calibration | None:
 
 
 def _from_transforms(values: Any) -> Calibration | None:
-    """Read the camera that a ``transforms.json`` of nerfstudio has for all of its images.
-
-    Like COLMAP, it has the centre of the first pixel at (0.5, 0.5).
-
-    Returns:
-        The camera; None where it is no such file, or each image has a camera of its own.
-    """
-    if not isinstance(values, Mapping) or "fl_x" not in values:
+    """Read the one camera of a ``transforms.json``, or return None for any other JSON file."""
+    if not isinstance(values, Mapping):
         return None
-    is_fisheye = values.get("camera_model") == "OPENCV_FISHEYE" or values.get("is_fisheye") is True
-    width, height = _size(values, ("w", "h"))
-    pinhole = {name: values.get(name) for name in ("fl_x", "fl_y", "cx", "cy")}
-    pinhole["fl_y"] = values.get("fl_y", values["fl_x"])
-    fx, fy, cx, cy = (_numbers(pinhole, (name,), (1,))[0] for name in pinhole)
-    names = ("k1", "k2", "k3", "k4") if is_fisheye else ("k1", "k2", "p1", "p2", "k3", "k4")
-    lens = [_numbers({name: values.get(name, 0.0)}, (name,), (1,))[0] for name in names]
+    frames = values.get("frames")
+    entries = frames if isinstance(frames, list) else []
+    entries = [entry for entry in entries if isinstance(entry, Mapping)]
+    has_poses = any("transform_matrix" in entry for entry in entries)
+    if not (has_poses or "fl_x" in values or "camera_angle_x" in values):
+        return None
+    # A frame may have a camera of its own.
+    cameras = {transforms_camera({**values, **entry}) for entry in entries or [{}]}
+    if len(cameras) > 1:
+        raise ValueError(
+            f"frames: have {len(cameras)} cameras; write the one you want into a file of its own,"
+            " with fl_x, fl_y, cx, cy, w and h"
+        )
+    return cameras.pop()
+
+
+def transforms_camera(
+    values: Mapping[str, Any], image_px: tuple[int, int] | None = None
+) -> Calibration:
+    """Read the camera of a ``transforms.json`` of nerfstudio or instant-ngp.
+
+    Like COLMAP, it has the centre of the first pixel at (0.5, 0.5). Source: nerfstudio's
+    documentation, Data conventions; instant-ngp's ``colmap2nerf.py``.
+
+    Args:
+        values: Entries of the file, and those of a frame in place of the file's.
+        image_px: Width and height of the image, where the file may leave them out.
+
+    Raises:
+        ValueError: It is no camera, or one whose lens is not read; the message begins with the
+            field.
+    """
+    says_fisheye = values.get("is_fisheye") is True
+    model = values.get("camera_model", TRANSFORMS_FISHEYE if says_fisheye else "OPENCV")
+    if model not in (*COLMAP_MODELS, TRANSFORMS_FISHEYE):
+        raise ValueError(
+            f"camera_model: {_shortened(model)} is not read, only"
+            f" {', '.join((*COLMAP_MODELS, TRANSFORMS_FISHEYE))}; undistort the images to PINHOLE"
+            " first"
+        )
+    if says_fisheye and model != TRANSFORMS_FISHEYE:
+        raise ValueError(f"is_fisheye: is true, but camera_model is {model}; keep what is right")
+    if image_px is not None and "w" not in values and "h" not in values:
+        width, height = image_px
+    else:
+        width, height = _size(values, ("w", "h"))
+    fx, fy, cx, cy = _transforms_pinhole(values, width, height)
+    is_fisheye = model == TRANSFORMS_FISHEYE
+    names = ("k1", "k2", "k3", "k4") if is_fisheye else COLMAP_MODELS["FULL_OPENCV"][4:]
+    lens = [_number({name: values.get(name, 0.0)}, name) for name in names]
     if is_fisheye:
         k1, k2, k3, k4 = lens
         return Calibration(width, height, fx, fy, cx, cy, PINHOLE, "fisheye", (k1, k2, k3, k4))
     return Calibration(width, height, fx, fy, cx, cy, _five("k4", lens))
+
+
+def _transforms_pinhole(
+    values: Mapping[str, Any], width: int, height: int
+) -> tuple[float, float, float, float]:
+    """Read focal lengths and principal point, fx, fy, cx and cy, in pixels."""
+    if "fl_x" in values or "camera_angle_x" not in values:
+        fx = _number(values, "fl_x")
+        fy = _number(values, "fl_y") if "fl_y" in values else fx
+        return fx, fy, _number(values, "cx"), _number(values, "cy")
+    # As instant-ngp and Blender's synthetic scenes have it: the whole angle of the view.
+    fx = _focal_of_angle(values, "camera_angle_x", width)
+    fy = _focal_of_angle(values, "camera_angle_y", height) if "camera_angle_y" in values else fx
+    middle = {"cx": width / 2, "cy": height / 2, **values}
+    return fx, fy, _number(middle, "cx"), _number(middle, "cy")
+
+
+def _focal_of_angle(values: Mapping[str, Any], name: str, side_px: int) -> float:
+    angle_rad = _number(values, name)
+    if not 0.0 < angle_rad < math.pi:
+        raise ValueError(f"{name}: must be an angle between 0 and pi radians, found {angle_rad:g}")
+    return 0.5 * side_px / math.tan(0.5 * angle_rad)
 
 
 def _from_mapping(values: Any) -> Calibration:
@@ -321,11 +382,16 @@ def _size(
     if any(name in values for name in SIZE):
         names, held = (SIZE[0], SIZE[0]), _numbers(values, SIZE, (2,))
     else:
-        held = [_numbers(values, (name,), (1,))[0] for name in names]
+        held = [_number(values, name) for name in names]
     for name, value in zip(names, held, strict=True):
         if not (value >= 1 and value == int(value)):
             raise ValueError(f"{name}: must be a whole number of pixels, found {value:g}")
     return int(held[0]), int(held[1])
+
+
+def _number(values: Mapping[str, Any], name: str) -> float:
+    """Read the one number under a name."""
+    return _numbers(values, (name,), (1,))[0]
 
 
 def _numbers(values: Mapping[str, Any], names: Sequence[str], counts: Sequence[int]) -> list[float]:

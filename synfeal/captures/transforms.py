@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from synfeal.camera.calibration import Calibration
+from synfeal.camera.calibration import Calibration, transforms_camera
 from synfeal.captures.capture import (
     GL_FROM_CAM,
     Capture,
     CapturedFrame,
-    calibration,
     partial_read,
     resized,
     rigid_pose,
@@ -20,14 +18,12 @@ from synfeal.captures.capture import (
 from synfeal.captures.formats import CaptureFormat
 from synfeal.captures.images import depth_reader, photograph_size, read_photograph
 from synfeal.dataset.images import image_size
-from synfeal.errors import InputError, read_as
+from synfeal.errors import InputError, read_as, why
 from synfeal.records.files import names_below, read_json
 
 NAME = "transforms.json"
 # Depth is in millimetres unless ``depth_unit_scale_factor`` says what else.
 METRES_PER_UNIT = 1e-3
-PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV")
-FISHEYE = ("OPENCV_FISHEYE",)
 
 
 def _file_of(path: Path) -> Path:
@@ -129,12 +125,7 @@ def _frame(
     place: str,
     moved: int,
 ) -> CapturedFrame:
-    said = {**values, **entry}
-    size = image_size(photograph)
-    if "w" in said and "h" in said:
-        with read_as(place, "a camera", TypeError, ValueError):
-            size = photograph_size(photograph, int(said["w"]), int(said["h"]))
-    camera = _camera(said, size, place)
+    camera = _camera({**values, **entry}, photograph, place)
     pose = rigid_pose(entry.get("transform_matrix"), f"{place}.transform_matrix") @ GL_FROM_CAM
     depth_file, depth_camera = None, None
     if entry.get("depth_file_path") is not None:
@@ -144,7 +135,7 @@ def _frame(
         depth_camera = resized(camera, *image_size(depth_file))
     return CapturedFrame(
         name=str(photograph.relative_to(file.parent)),
-        read_color=partial_read(read_photograph, photograph, *size),
+        read_color=partial_read(read_photograph, photograph, camera.width, camera.height),
         camera=camera,
         world_from_cam=pose,
         read_depth_m=depth_reader(depth_file, units_per_m),
@@ -153,36 +144,14 @@ def _frame(
     )
 
 
-def _camera(values: Mapping[str, Any], size: tuple[int, int], place: str) -> Calibration:
+def _camera(values: Mapping[str, Any], photograph: Path, place: str) -> Calibration:
     """Read the camera of a frame: what it says itself goes before what the file says."""
-    model = values.get("camera_model", "OPENCV")
-    if model not in PERSPECTIVE + FISHEYE:
-        raise InputError(
-            place, f"camera_model {model} is not read", "undistort the images to PINHOLE first"
-        )
-    with read_as(place, "a camera", TypeError, ValueError, KeyError):
-        width, height = int(values.get("w", size[0])), int(values.get("h", size[1]))
-        if "fl_x" in values:
-            fx = float(values["fl_x"])
-        else:  # as instant-ngp and Blender's synthetic scenes have it
-            fx = 0.5 * width / math.tan(0.5 * float(values["camera_angle_x"]))
-        fy = float(values.get("fl_y", fx))
-        cx, cy = float(values.get("cx", width / 2)), float(values.get("cy", height / 2))
-        names = ("k1", "k2", "k3", "k4") if model in FISHEYE else ("k1", "k2", "p1", "p2", "k3")
-        lens = tuple(float(values.get(name, 0.0)) for name in names)
-    if model in FISHEYE:
-        camera = calibration(
-            width,
-            height,
-            (fx, fy, cx, cy),
-            place,
-            projection="fisheye",
-            fisheye_k=lens,
-        )
-    else:
-        camera = calibration(width, height, (fx, fy, cx, cy), place, distortion=lens)
+    try:
+        camera = transforms_camera(values, image_size(photograph))
+    except ValueError as error:
+        raise InputError(place, why(error)) from error
     # Images that were made smaller after they were calibrated (images_2, images_4).
-    return camera if size == (width, height) else resized(camera, *size)
+    return resized(camera, *photograph_size(photograph, camera.width, camera.height))
 
 
 FORMAT = CaptureFormat(
