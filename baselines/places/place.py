@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from baselines.references.mapped import photographs_camera
 from baselines.references.stated_errors import FILE as TRIAL
 from synfeal.camera.calibration import read_calibration
 from synfeal.camera.photograph import PhotographCamera
@@ -123,10 +124,11 @@ def open_map(folder: Path, camera: PhotographCamera) -> tuple[Path, PhotographCa
 
     Args:
         folder: A map, or a place that has one.
-        camera: As a person gives it; in a place, its capture's stands in where nothing is known.
+        camera: As a person gives it. In a place of a capture, and in a map of photographs, the one
+            that took these stands in where nothing is known.
     """
     if not is_place(folder):
-        return folder, camera
+        return folder, replace(camera, otherwise=photographs_camera(folder))
     place, _ = read_place(folder)
     if not place.camera.is_file():  # it was built from a mesh
         return place.map, camera

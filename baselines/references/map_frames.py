@@ -52,6 +52,7 @@ class MapFrames:
         sequence_from_world: Rigid motion (4, 4) to the world of the sequence that the place was
             scanned from; None where the world of the frames is the only one known.
         mesh_file: How the mesh that they were rendered of is to be read.
+        are_photographs: True where a camera took them, so that it may have taken others, too.
     """
 
     source: Path
@@ -62,6 +63,7 @@ class MapFrames:
     rgbd: RgbdCamera
     sequence_from_world: Array | None
     mesh_file: MeshFile
+    are_photographs: bool
 
     def __len__(self) -> int:
         return len(self.names)
@@ -226,6 +228,7 @@ def read_map_frames(
         rgbd=rgbd,
         sequence_from_world=read_sequence_from_world(folder) if rendered else np.eye(4),
         mesh_file=_mesh_file(folder / MANIFEST) if rendered else MeshFile(),
+        are_photographs=not rendered,
     )
 
 

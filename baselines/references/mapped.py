@@ -33,6 +33,7 @@ from baselines.references.features import Features
 from baselines.references.map_frames import MapFrames, MeshFile
 from baselines.references.repeats import PosedFeatures, Repeats, find_repeats
 from baselines.references.triangulated import triangulated
+from synfeal.camera.calibration import Calibration
 from synfeal.camera.projection import normalised_of_pixels
 from synfeal.config.dataset import CameraConfig
 from synfeal.config.load import describe
@@ -62,6 +63,8 @@ Array = NDArray[np.float64]
 FORMAT, VERSION = "synfeal map", 1
 RECORD, FRAMES, FEATURES, RETRIEVAL = "map.json", "frames.csv", "features.npz", "retrieval.npz"
 REPEATS = "repeats.npz"
+# Whether the frames of a map are photographs; maps of earlier versions do not say.
+PHOTOGRAPHS = "photographs"
 VIEW_PX = 64  # side of what retrieval sees of a frame, squeezed into a square
 # Most features of a frame, and their least contrast (OpenCV's default is 0.04): rendered surfaces
 # are smoother than photographs of them.
@@ -187,6 +190,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         "frames": len(frames),
         "features": len(features.slope),
         "source": str(frames.source),
+        PHOTOGRAPHS: frames.are_photographs,
         "rgbd_camera": frames.rgbd.record,
         "max_features": MAX_FEATURES,
         "contrast": CONTRAST,
@@ -310,6 +314,16 @@ def read_map(folder: Path) -> StructureMap:
         record=record,
         repeats=repeats,
     )
+
+
+def photographs_camera(folder: Path) -> Calibration | None:
+    """Return the camera that took the frames of a map; None where they are renderings.
+
+    Raises:
+        InputError: It is no map.
+    """
+    record, shown, _ = _read_record(folder)
+    return Calibration.of_camera(shown.camera) if record.get(PHOTOGRAPHS) is True else None
 
 
 def _read_record(folder: Path) -> tuple[dict[str, Any], Shown, Array | None]:

@@ -196,7 +196,7 @@ def test_without_a_focal_length_nothing_is_guessed(place, tmp_path, capsys):
     assert not out.exists()
 
 
-def test_photographs_with_depth_make_a_map_too(tmp_path):
+def test_photographs_with_depth_make_a_map_too(tmp_path, capsys):
     """Depth from a camera beside the colour camera, with another lens and in other units."""
     paint, poses, truth = textures(0), looking_about(N_FRAMES, 1), looking_about(4, 2)
     depth_camera = CameraConfig(width=200, height=160, fx=190.0, fy=190.0, cx=104.0, cy=77.0)
@@ -219,6 +219,18 @@ def test_photographs_with_depth_make_a_map_too(tmp_path):
         errors[name] = np.median(np.nan_to_num(pose_error(found, truth)[0], nan=np.inf))
     assert errors["right"] < PIXEL_M
     assert errors["wrong"] > 2 * errors["right"]
+    # More photographs of the camera that took those of the map need nothing else.
+    write_photographs(tmp_path / "more", paint, truth, FRAME)
+    _, found = localized(
+        tmp_path, tmp_path / "more", tmp_path / "more.csv", "--no-exif", map_="right", camera=None
+    )
+    assert np.median(pose_error(found, truth)[0]) < PIXEL_M
+    # Photographs of other proportions are of another one.
+    line = refused(
+        capsys, "localize", tmp_path / "right", tmp_path / "photos", "--out", tmp_path / "x.csv"
+    )
+    assert "photo-00.png" in line
+    assert "--focal" in line
 
 
 def rotation_from_vector(vector):
