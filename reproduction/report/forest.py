@@ -21,17 +21,9 @@ from matplotlib.figure import Figure
 from reproduction.figures.style import BLUE, GREEN, VERMILION, Style
 from reproduction.replications.effects import NETWORKS
 from reproduction.replications.pooling import CLAIMS, EFFECTS, POOLED
+from reproduction.replications.tables import REMEDY, read_effects, read_verdicts
 from reproduction.report.stamped import digest, stamped_png, write_stamped
 from synfeal.errors import exit_status
-from synfeal.records.tables import (
-    COUNT,
-    LIMITLESS,
-    LIMITLESS_MAYBE,
-    MAYBE,
-    TEXT,
-    Kind,
-    read_frame,
-)
 
 PICTURE = "claims.png"
 # Claims that one thing is best have a row for each rival; the nearest one decides.
@@ -39,21 +31,6 @@ BEST = "C12"
 COLORS = {"position": BLUE, "orientation": VERMILION}
 TICKS_PERCENT = (-80, -50, 0, 100, 300)
 ROW_INCHES = 0.27
-REMEDY = "pool the replications again: python -m reproduction.replications pool"
-AGAINST = Kind("str", optional=True)  # empty of batches, which no score is needed for
-EFFECTS_SCHEMA = {
-    "claim": TEXT,
-    "part": TEXT,
-    "quantity": TEXT,
-    "against": AGAINST,
-    "replication": TEXT,
-    "value": LIMITLESS,
-    "low": LIMITLESS_MAYBE,
-    "high": LIMITLESS_MAYBE,
-    "printed": MAYBE,
-    "unit": TEXT,
-}
-CLAIMS_SCHEMA = {"claim": TEXT, "against": AGAINST, "verdict": TEXT, "replications": COUNT}
 
 
 class Row(NamedTuple):
@@ -76,27 +53,46 @@ class Row(NamedTuple):
     printed: float
 
 
-def write_forest(effects: Path, claims: Path, out_png: Path) -> None:
-    """Draw the pooled effects of the claims, against the true poses, beside the paper's.
+class Forest(NamedTuple):
+    """Everything that the plot shows.
+
+    Attributes:
+        changes: Effects in percent.
+        shares: Shares of batches.
+        verdicts: Verdict of each claim by its id.
+    """
+
+    changes: list[Row]
+    shares: list[Row]
+    verdicts: dict[str, str]
+
+    @property
+    def digest(self) -> str:
+        """Hash of what is shown."""
+        verdicts = sorted(self.verdicts.items())
+        return digest([str(part) for part in (*self.changes, *self.shares, *verdicts)])
+
+
+def read_forest(folder: Path) -> Forest:
+    """Read the pooled effects of the claims, against the true poses, beside the paper's.
 
     Args:
-        effects: ``claim_effects.csv``.
-        claims: ``claims.csv``, with the verdicts.
-        out_png: Picture to write.
+        folder: Of the pooled tables.
 
     Raises:
         InputError: A table cannot be read.
     """
-    table = read_frame(effects, EFFECTS_SCHEMA, REMEDY)
-    judged = read_frame(claims, CLAIMS_SCHEMA, REMEDY)
-    told = judged[judged["against"] != "labels"]
-    verdicts = dict(zip(told["claim"], told["verdict"], strict=True))
-    changes, shares = rows_in(table, "percent"), rows_in(table, "share")
-    drawn = stamped_png(
-        lambda: forest_figure(changes, shares, verdicts),
-        digest([str(row) for row in (*changes, *shares)]),
+    table, judged = read_effects(folder / EFFECTS), read_verdicts(folder / CLAIMS)
+    return Forest(
+        rows_in(table, "percent"),
+        rows_in(table, "share"),
+        {claim: verdict for (claim, against), verdict in judged.items() if against != "labels"},
     )
-    write_stamped(drawn, out_png)
+
+
+def write_forest(forest: Forest, out_png: Path) -> None:
+    """Draw the pooled effects as PNG."""
+    write_stamped(stamped_png(lambda: forest_figure(forest), forest.digest), out_png)
 
 
 def rows_in(table: pd.DataFrame, unit: str) -> list[Row]:
@@ -132,16 +128,9 @@ def _row(values: pd.DataFrame) -> Row:
     )
 
 
-def forest_figure(
-    changes: Sequence[Row], shares: Sequence[Row], verdicts: dict[str, str]
-) -> Figure:
-    """Draw a row for each part: replications as ticks, the pooled value with limits, print.
-
-    Args:
-        changes: Changes in percent.
-        shares: Shares of batches.
-        verdicts: Verdict of each claim by its id.
-    """
+def forest_figure(forest: Forest) -> Figure:
+    """Draw a row for each part: replications as ticks, the pooled value with limits, print."""
+    changes, shares, verdicts = forest
     heights = [len(changes) + 1.5, len(shares) + 1.5]
     figure = Figure(figsize=(9.5, ROW_INCHES * sum(heights) + 1.2), layout="constrained")
     above, below = figure.subplots(2, 1, height_ratios=heights)
@@ -217,9 +206,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="of the pooled tables")
     folder = parser.parse_args(arguments).folder
-    return exit_status(
-        lambda: write_forest(folder / EFFECTS, folder / CLAIMS, folder / PICTURE), REMEDY
-    )
+    return exit_status(lambda: write_forest(read_forest(folder), folder / PICTURE), REMEDY)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,59 @@
+"""Read the tables of pooled replications."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from reproduction.replications.pooling import CLAIMS, EFFECTS
+from synfeal.records.tables import (
+    COUNT,
+    LIMITLESS,
+    LIMITLESS_MAYBE,
+    MAYBE,
+    TEXT,
+    Kind,
+    read_frame,
+)
+
+REMEDY = "pool the replications again: python -m reproduction.replications pool"
+AGAINST = Kind("str", optional=True)  # empty of batches, which no score is needed for
+EFFECTS_SCHEMA = {
+    "claim": TEXT,
+    "part": TEXT,
+    "quantity": TEXT,
+    "against": AGAINST,
+    "replication": TEXT,
+    "value": LIMITLESS,
+    "low": LIMITLESS_MAYBE,
+    "high": LIMITLESS_MAYBE,
+    "printed": MAYBE,
+    "unit": TEXT,
+}
+CLAIMS_SCHEMA = {"claim": TEXT, "against": AGAINST, "verdict": TEXT, "replications": COUNT}
+
+
+def has_pooled(folder: Path) -> bool:
+    """Tell whether replications have been pooled there."""
+    return all((folder / name).is_file() for name in (EFFECTS, CLAIMS))
+
+
+def read_effects(path: Path) -> pd.DataFrame:
+    """Read ``claim_effects.csv``: a row for each effect and replication, and the pooled one.
+
+    Raises:
+        InputError: The table cannot be read.
+    """
+    return read_frame(path, EFFECTS_SCHEMA, REMEDY)
+
+
+def read_verdicts(path: Path) -> dict[tuple[str, str], str]:
+    """Read ``claims.csv``: the verdict on each claim by its id and what errors are against.
+
+    Raises:
+        InputError: The table cannot be read.
+    """
+    rows = read_frame(path, CLAIMS_SCHEMA, REMEDY)
+    keys = zip(rows["claim"], rows["against"].fillna(""), strict=True)
+    return dict(zip(keys, rows["verdict"], strict=True))

@@ -1,0 +1,74 @@
+"""One line for each claim of the paper: what is printed, what was found, and the verdict.
+
+Told by the pooled replications once there are any; until then by the runs with fresh seeds, each
+claim by the one that decides it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from reproduction.claims.verdicts import published_claims
+from reproduction.replications.tables import has_pooled
+from reproduction.report.fresh import BESIDE, Judged, claims_to_test, judged_fresh
+from reproduction.report.pooled import pooled_claims
+from reproduction.report.published_claims import read_published, rows_now
+from reproduction.tables.sheet import markdown_table
+
+NOT_RUN = "not judged yet"
+REPLICATIONS = "replications"
+
+
+def claims_table(root: Path) -> str:
+    """Tabulate all claims, in their order.
+
+    Args:
+        root: Published results that tell the claims no fresh seed is needed for, among the others.
+    """
+    replications = root.with_name(REPLICATIONS)
+    if has_pooled(replications):
+        return pooled_claims(replications)
+    judged = judged_fresh(root.parent)
+    drawn = {claim.id for claim in claims_to_test()}
+    built = {row["id"]: row for row in rows_now(read_published(root), root)}
+    rows = []
+    for claim in published_claims():
+        told = {"": claim.id, "Claim": claim.statement, "Printed": claim.published}
+        if claim.id in drawn:
+            told |= _of_runs(judged.get(claim.id, ()))
+        else:
+            row = built.get(claim.id, {})
+            told |= _cells(row, row.get("verdict_true", NOT_RUN), f"`{root.name}`" if row else "")
+        rows.append(told)
+    return _with_minus(markdown_table(pd.DataFrame(rows)))
+
+
+def _of_runs(judged: Sequence[Judged]) -> dict[str, str]:
+    """Tell a claim by the run that decides it, else by the first; name those that leave it open."""
+    if not judged:
+        return _cells({}, NOT_RUN, "")
+    told = next((own for own in judged if own.decided), judged[0])
+    others = [own for own in judged if own is not told]
+    runs = f"`{told.profile}`"
+    if agree := [f"`{own.profile}`" for own in others if own.decided]:
+        runs += f", like {', '.join(agree)}"
+    left_open = [f"`{own.profile}`" for own in others if not own.decided]
+    if left_open and told.decided:
+        runs += f"; open in {', '.join(left_open)}"
+    elif left_open:
+        runs += f", like {', '.join(left_open)}"
+    return _cells(told.row, told.row["verdict_true"], runs)
+
+
+def _cells(row: Mapping[str, str], verdict: str, runs: str) -> dict[str, str]:
+    measured = BESIDE.split(row.get("measured_true", ""))[0]
+    limits = row.get("interval_true") or "–"
+    return {"Ours": measured, "95 % limits": limits, "Verdict": f"**{verdict}**", "Run": runs}
+
+
+def _with_minus(text: str) -> str:
+    """Put a minus sign where a hyphen stands before a digit."""
+    return text.replace(" -", " −")
