@@ -35,6 +35,7 @@ root_doc = "docs/index"
 include_patterns = [
     "docs/*.md",
     "docs/*.ipynb",
+    "docs/paper/*.md",
     "docs/tutorials/*.ipynb",
     "docs/reference/**.rst",
     "README.md",

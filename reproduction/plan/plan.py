@@ -17,6 +17,7 @@ from reproduction.plan.text import SIZES, duration, number, scaled
 from reproduction.tables.sheet import text_table
 from synfeal.records.tables import write_frame
 
+TABLE_ALONE = "table alone"
 NOTES = """\
 measured    {measured}
 CPU time    of a core like theirs; the sum is meant to be within a factor of 1.5 (docs/cost.md)
@@ -56,6 +57,21 @@ def planned_cpu_s(profile: str, measured: Sequence[Path]) -> pd.Series[float]:
     return rows.set_index("name")["cpu_s"]
 
 
+def planned_tables(profile: str, measured: Sequence[Path], cores: int) -> pd.DataFrame:
+    """Predict what a run costs that makes one of the tables alone, and begins with nothing.
+
+    Args:
+        profile: Its profile's name, or its file.
+        measured: Results of the runs it is predicted from.
+        cores: Jobs at a time.
+
+    Returns:
+        Columns ``jobs``, ``cpu_s`` and ``wall_s``, by table.
+    """
+    costs = _costs(read_profile(profile), paces_of(map(read_run, measured)), cores)
+    return costs[costs["part"] == TABLE_ALONE].set_index("name")[["jobs", "cpu_s", "wall_s"]]
+
+
 def compare_text(measured: Sequence[Path], compared: Path, csv: Path | None = None) -> str:
     """Predict a measured run from each of others, and each of those from it.
 
@@ -85,7 +101,7 @@ def _costs(files: Files, paces: pd.DataFrame, cores: int) -> pd.DataFrame:
     for table in files.design.tables:
         config = files.config.model_copy(update={"tables": (table,)})
         alone = Files(config, read_design(config))
-        wholes["table alone", table] = _by_rule(alone, paces, cores)
+        wholes[TABLE_ALONE, table] = _by_rule(alone, paces, cores)
     sums = [
         {"part": part, "name": name, **rows[["jobs", "cpu_s", "wall_s"]].sum()}
         for (part, name), rows in wholes.items()

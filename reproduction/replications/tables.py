@@ -17,6 +17,7 @@ from synfeal.records.tables import (
     read_frame,
 )
 
+REPLICATIONS = "replications"  # folder of archives and pooled tables, among published runs
 REMEDY = "pool the replications again: python -m reproduction.replications pool"
 AGAINST = Kind("str", optional=True)  # empty of batches, which no score is needed for
 EFFECTS_SCHEMA = {

@@ -12,14 +12,13 @@ from pathlib import Path
 import pandas as pd
 
 from reproduction.claims.verdicts import published_claims
-from reproduction.replications.tables import has_pooled
-from reproduction.report.fresh import BESIDE, Judged, claims_to_test, judged_fresh
+from reproduction.replications.tables import REPLICATIONS, has_pooled
+from reproduction.report.fresh import BESIDE, Judged, claims_to_test, judged_fresh, outcome
 from reproduction.report.pooled import pooled_claims
 from reproduction.report.published_claims import read_published, rows_now
 from reproduction.tables.sheet import markdown_table
 
 NOT_RUN = "not judged yet"
-REPLICATIONS = "replications"
 
 
 def claims_table(root: Path) -> str:
@@ -54,13 +53,13 @@ def _of_runs(judged: Sequence[Judged]) -> dict[str, str]:
     others = [own for own in judged if own is not told]
     runs = f"`{told.profile}`"
     if agree := [f"`{own.profile}`" for own in others if own.decided]:
-        runs += f", like {', '.join(agree)}"
+        runs += f", also {', '.join(agree)}"
     left_open = [f"`{own.profile}`" for own in others if not own.decided]
     if left_open and told.decided:
         runs += f"; open in {', '.join(left_open)}"
     elif left_open:
-        runs += f", like {', '.join(left_open)}"
-    return _cells(told.row, told.row["verdict_true"], runs)
+        runs += f", also {', '.join(left_open)}"
+    return _cells(told.row, outcome(judged), runs)
 
 
 def _cells(row: Mapping[str, str], verdict: str, runs: str) -> dict[str, str]:

@@ -22,7 +22,6 @@ from reproduction.claims.verdicts import GROUPS, Claim, Verdict, published_claim
 from reproduction.plan.plan import planned_cpu_s
 from reproduction.report.publish import PUBLISHED
 from reproduction.report.published_claims import (
-    SHOWN_MEANINGS,
     published_runs,
     read_published,
     rules_of,
@@ -178,29 +177,7 @@ def fresh_claims(published: Path = PUBLISHED) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def fresh_answer(published: Path = PUBLISHED) -> str:
-    """List the claims by what fresh seeds say about them against the truth, in plain words."""
-    judged = judged_fresh(published)
-    if not judged:
-        return NONE_YET
-    titles = {str(verdict): f"**{verdict}** ({text})" for verdict, text in SHOWN_MEANINGS.items()}
-    groups: dict[str, list[str]] = {name: [] for name in (*titles, CONTRADICTED)}
-    for own in judged.values():
-        groups[_outcome(own)].append(
-            f"    - claimed: “{own[0].claim.statement}” ({_runs_behind(own)})"
-        )
-    lines = [
-        line
-        for name, claims in groups.items()
-        if claims
-        for line in (f"- {titles.get(name, f'**{name}**')}:", *claims)
-    ]
-    return "\n".join(
-        [f"{_counts(judged)} Judged by the errors against the true poses:", "", *lines]
-    )
-
-
-def _outcome(judged: Sequence[Judged]) -> str:
+def outcome(judged: Sequence[Judged]) -> str:
     """Return the verdict that runs come to on one claim, or that they contradict each other."""
     decided = decided_verdicts(judged)
     if len(decided) > 1:
@@ -208,23 +185,12 @@ def _outcome(judged: Sequence[Judged]) -> str:
     return str(*(decided or {judged[0].row["verdict_true"]}))
 
 
-def _runs_behind(judged: Sequence[Judged]) -> str:
-    """Name a claim and its runs; of several that decide and leave open, both."""
-    runs: dict[bool, list[str]] = {True: [], False: []}
-    for own in judged:
-        runs[own.decided].append(f"`{own.profile}`")
-    parts = [", ".join(runs[True] or runs[False])]
-    if runs[True] and runs[False]:
-        parts.append(f"open in {', '.join(runs[False])}")
-    return f"{judged[0].claim.id}: {'; '.join(parts)}"
-
-
 def _counts(judged: Mapping[str, Sequence[Judged]]) -> str:
     """Say how many claims were judged with fresh seeds, and how they fared, group by group."""
     decided = sum(map(is_decided, judged.values()))
     groups = []
     for group, title in GROUPS.items():
-        counts = Counter(_outcome(own) for own in judged.values() if own[0].claim.group == group)
+        counts = Counter(outcome(own) for own in judged.values() if own[0].claim.group == group)
         if counts:
             found = ", ".join(f"{number} {name}" for name, number in counts.most_common())
             groups.append(f"*{title}* {found}")

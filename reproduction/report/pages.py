@@ -21,7 +21,10 @@ import pandas as pd
 
 from baselines.config.learning import MODELS
 from reproduction.claims.table import claims_markdown
+from reproduction.claims.verdicts import published_claims
 from reproduction.real.findings import real_findings, real_headline, real_short, real_table
+from reproduction.replications.tables import REPLICATIONS, has_pooled
+from reproduction.report.claims_table import claims_table
 from reproduction.report.effects_figure import effects_digest, effects_picture
 from reproduction.report.findings import (
     CONTROLS,
@@ -34,9 +37,12 @@ from reproduction.report.findings import (
     verdict_sentence,
 )
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
-from reproduction.report.fresh import fresh_answer, fresh_claims
-from reproduction.report.paper_cells import paper_cells
+from reproduction.report.forest import read_forest, write_forest
+from reproduction.report.fresh import fresh_claims
+from reproduction.report.paper_cells import TABLES, paper_cells
 from reproduction.report.paper_figure import cells_digest, paper_picture
+from reproduction.report.paper_tables import cells_beside_print, making, meshes_beside_print
+from reproduction.report.pooled import pooled_lines
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
 from reproduction.report.realisations import PAPER_FRAMES, realisations_table
@@ -60,22 +66,27 @@ from synfeal.records.tables import (
     rows_of,
 )
 
-PAGES = (Path("README.md"), Path("docs/results.md"), Path("docs/scenes.md"))
+PAGES = (
+    Path("README.md"),
+    *map(Path, ("docs/results.md", "docs/runs.md", "docs/scenes.md")),
+    *(Path(f"docs/paper/table{number}.md") for number in range(1, 6)),
+)
 # Shows a run that needs photographs which are not ours to pass on: nothing until one is published.
 REAL_PAGE, REAL = Path("docs/real.md"), "real"
 # Scores of what others published, which `make publish` does not make anew.
 OTHERS_POSES = Path("results/benchmarks/published_poses.csv")
 FIGURE = Path("docs/images/findings.png")
 PAPER_FIGURE = Path("docs/images/paper_against_ours.png")
+FOREST_FIGURE = Path("docs/images/claims.png")
 EFFECTS_FIGURE = Path("docs/images/effects.png")
 HEADLINES = ("night", "mini")
 LIMITS_NOTE = (
     "Brackets hold 95 % limits over test paths and training runs. The changes with label errors by"
     " shape, with noise and with the size of the data set, and those of PoseNet2, have limits from"
     " errors compared frame by frame, most of them as claims are judged ([this run's"
-    " claims]({claims}), [claims with fresh seeds]({claims}-judged-with-fresh-seeds)). Limits of"
-    " other changes are computed as if the two errors had been measured on different frames, which"
-    " makes them wide."
+    " claims](runs.md#claims-judged-by-the-first-run), [claims with fresh"
+    " seeds](runs.md#claims-judged-with-fresh-seeds)). Limits of other changes are computed as if"
+    " the two errors had been measured on different frames, which makes them wide."
 )
 NOISE_HEADINGS = {
     "published": "published",
@@ -93,19 +104,18 @@ def headline() -> str:
     return next((name for name in HEADLINES if (PUBLISHED / name).is_dir()), HEADLINES[-1])
 
 
-def findings(root: Path, top: str, claims_page: str) -> str:
+def findings(root: Path, top: str) -> str:
     """Say what the run found, most important first, and how far its limits reach.
 
     Args:
         root: Published results.
         top: Path from the page to the top of the repository, ending in a slash.
-        claims_page: Path from the page to the one with the claims.
     """
     if not can_tell(root):
         return verdict_sentence(root)
     found = sentences(root, f"{top}{root.as_posix()}")
     items = "\n".join(f"{n}. {text}" for n, text in enumerate(found, start=1))
-    return f"{items}\n\n{LIMITS_NOTE.format(claims=f'{claims_page}#claims')}"
+    return f"{items}\n\n{LIMITS_NOTE}"
 
 
 def found(root: Path) -> str:
@@ -202,10 +212,27 @@ def difficulty(folder: Path = RESULTS / "benchmarks" / "scene_difficulty") -> st
     return markdown_table(pd.DataFrame([_difficulty(folder, name) for name in names]))
 
 
+def lines(root: Path) -> str:
+    """Tell what was reproduced: by the pooled replications, once there are any."""
+    replications = root.with_name(REPLICATIONS)
+    return pooled_lines(replications) if has_pooled(replications) else reproduced(root)
+
+
+def verdicts(root: Path) -> str:
+    """Tell each claim in a line, and what is unclear about it in print."""
+    notes = [f"- {claim.id}: {claim.footnote}" for claim in published_claims() if claim.footnote]
+    return "\n".join([claims_table(root), "", *notes])
+
+
+def _making(root: Path, name: str) -> str:
+    return making(name, root.name)
+
+
+PAPERS = {name.partition("_")[0]: name for name in TABLES}  # `table2` to `table5`
 PARTS: dict[str, Callable[[Path], str]] = {
     "found": found,
-    "reproduced": reproduced,
-    "answer": partial(findings, top="../", claims_page=""),
+    "reproduced": lines,
+    "answer": partial(findings, top="../"),
     "origin": origin,
     "size": size_table,
     "labels": labels_table,
@@ -216,7 +243,10 @@ PARTS: dict[str, Callable[[Path], str]] = {
     # Of all published runs together, whatever profile the mark names.
     "fresh": lambda root: fresh_claims(root.parent),
     "realisations": lambda root: realisations_table(root.parent),
-    "tested": lambda root: fresh_answer(root.parent),
+    "verdicts": verdicts,
+    "meshes": meshes_beside_print,
+    **{part: partial(cells_beside_print, name=name) for part, name in PAPERS.items()},
+    **{part.replace("table", "cost"): partial(_making, name=name) for part, name in PAPERS.items()},
     "difficulty": lambda root: difficulty(),
     "real": real_findings,
     "real_headline": lambda root: real_headline(root, OTHERS_POSES),
@@ -314,6 +344,10 @@ def stale(check: bool) -> list[Path]:
     drawn = panels(shown) if can_tell(shown) else []
     if drawn and not is_drawn_from(FIGURE, drawn):
         writers[FIGURE] = partial(write_findings_figure, drawn, FIGURE)
+    if has_pooled(PUBLISHED / REPLICATIONS):
+        forest = read_forest(PUBLISHED / REPLICATIONS)
+        if not shows(FOREST_FIGURE, forest.digest):
+            writers[FOREST_FIGURE] = partial(write_forest, forest, FOREST_FIGURE)
     if (PUBLISHED / CONTROLS).is_dir():
         of_claims = effects(shown)
         if not shows(EFFECTS_FIGURE, effects_digest(of_claims)):

@@ -17,6 +17,7 @@ from reproduction.claims.rules import frozen_rules
 from reproduction.claims.table import verdict_counts
 from reproduction.claims.untrained import few_verdict
 from reproduction.claims.verdicts import GROUPS, MEANINGS, Verdict
+from reproduction.replications.tables import REPLICATIONS
 from reproduction.report.intervals import Interval
 from reproduction.tables.assistance import PUBLISHED_ASSISTED, PUBLISHED_SCENE, TOTAL
 from reproduction.tables.assistance import SCHEMA as ASSISTANCE
@@ -32,8 +33,12 @@ Row = Mapping[str, str]
 
 
 def published_runs(published: Path) -> list[Path]:
-    """List the folders of the published runs that judge claims, by name."""
-    return sorted(path.parent for path in published.glob("*/claims.csv"))
+    """List the folders of the published runs that judge claims, by name.
+
+    Replications judge claims together and are no such run.
+    """
+    folders = (path.parent for path in published.glob("*/claims.csv"))
+    return sorted(folder for folder in folders if folder.name != REPLICATIONS)
 
 
 def read_published(root: Path) -> list[dict[str, str]]:

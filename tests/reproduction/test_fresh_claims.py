@@ -12,11 +12,11 @@ from reproduction.claims.verdicts import Verdict
 from reproduction.config.load import load_config
 from reproduction.design.experiments import read_design
 from reproduction.plan.plan import plan_text
+from reproduction.report.claims_table import claims_table
 from reproduction.report.fresh import (
     PLANNED_FROM,
     RUNS,
     claims_to_test,
-    fresh_answer,
     fresh_claims,
     is_decided,
     judged_fresh,
@@ -57,7 +57,6 @@ def test_seeds_that_were_seen_and_rules_that_were_replaced_do_not_count(tmp_path
     publish_copy(tmp_path, "replaced", seed="7", rules=rules_history()[0].tag)
     assert judged_fresh(tmp_path) == {}
     assert "No claim" in fresh_claims(tmp_path)
-    assert "No claim" in fresh_answer(tmp_path)
     publish_copy(tmp_path, "fresh", seed="7")
     assert profiles(judged_fresh(tmp_path)) == {"fresh"}
 
@@ -85,10 +84,9 @@ def test_no_verdict_of_several_runs_is_passed_over(tmp_path):
     # The run that is for the claim, then the others; what could not judge it is no verdict.
     assert [own.profile for own in judged] == ["labels", "a", "b"]
     assert is_decided(judged)
-    answer = fresh_answer(tmp_path).splitlines()
-    (line,) = (line for line in answer if "(C2: `b`; open in `labels`, `a`)" in line)
-    above = answer[: answer.index(line)]
-    assert [other for other in above if other.startswith("- ")][-1].startswith("- **holds** (")
+    told = claims_table(tmp_path / "labels").splitlines()
+    (line,) = (line for line in told if line.startswith("| C2 |"))
+    assert line.endswith("| **holds** | `b`; open in `labels`, `a` |")
     text = fresh_claims(tmp_path)
     assert all(text.count(f"| `{profile}` |") for profile in ("labels", "a", "b"))
     assert "C2" not in text.split("What would decide the others")[1]
@@ -100,8 +98,8 @@ def test_runs_that_contradict_each_other_leave_a_claim_open(tmp_path):
     judged = judged_fresh(tmp_path)["C2"]
     assert all(own.decided for own in judged)
     assert not is_decided(judged)
-    contradicted = fresh_answer(tmp_path).split("- **runs contradict each other**:")[1]
-    assert "(C2: `labels`, `a`)" in contradicted
+    told = claims_table(tmp_path / "labels")
+    assert "| **runs contradict each other** | `labels`, also `a` |" in told
     left = fresh_claims(tmp_path).split("What would decide the others")[1]
     assert "C2" in left
 

@@ -7,6 +7,7 @@ import shutil
 import pandas as pd
 import pytest
 
+from reproduction.report.published_claims import published_runs
 from reproduction.report.realisations import realisations, realisations_table
 from tests import ROOT
 
@@ -24,7 +25,7 @@ def numbers(text):
 
 def test_every_run_on_the_papers_frames_is_told_and_no_other():
     told = {own.profile: own for own in realisations(PUBLISHED)}
-    for root in (path.parent for path in PUBLISHED.glob("*/claims.csv")):
+    for root in published_runs(PUBLISHED):
         row = claim(root)
         judged = bool(row["interval_true"])
         assert (root.name in told) == (judged and root.name != "mini"), root.name

@@ -40,6 +40,7 @@ from reproduction.replications.tables import read_effects
 from reproduction.report.claims_table import claims_table
 from reproduction.report.forest import PICTURE, main, rows_in
 from reproduction.report.pooled import pooled_claims, pooled_lines
+from reproduction.report.published_claims import published_runs
 from synfeal.errors import InputError
 from synfeal.records.tables import write_frame
 from tests.support import claims_results
@@ -184,6 +185,7 @@ def test_the_table_of_claims_has_printed_ours_and_verdict(pooled, tmp_path):
     assert "| 5 frames/s |" in before
     assert "not judged yet" in before
     shutil.copytree(pooled, published / "replications")
+    assert [run.name for run in published_runs(published)] == ["night"]
     assert claims_table(published / "night") == pooled_claims(pooled)
 
 

@@ -1,0 +1,99 @@
+"""The paper's tables, one page each: ours beside print in its own protocol, and what they cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from baselines.config.learning import MODELS
+from reproduction.plan.plan import planned_tables
+from reproduction.plan.text import duration
+from reproduction.report.findings import read_table
+from reproduction.report.fresh import PLANNED_FROM
+from reproduction.tables.layouts import BLOCKS, TITLES, label_title, row_label, scene_title
+from reproduction.tables.meshes import FACTS
+from reproduction.tables.meshes import NAME as MESHES
+from reproduction.tables.meshes import SCHEMA as MESHES_SCHEMA
+from reproduction.tables.sheet import markdown_table
+from synfeal.records.tables import read_frame, rows_of
+
+HEADINGS = {
+    "table2_ground_truth": "labels from",
+    "table3_inconsistencies": "noise in",
+    "table4_size": "scene, size (frames here)",
+    "table5_from_scratch": "scene, size (frames here)",
+}
+CORES = 2
+
+
+def meshes_beside_print(root: Path) -> str:
+    """Format Table 1: vertices, faces and volume of the meshes *(published in brackets)*."""
+    meshes = read_frame(root / "tables" / f"{MESHES}.csv", MESHES_SCHEMA, "publish again")
+    table: dict[str, object] = {"scene": meshes.scene.map(scene_title)}
+    for fact, (title, form) in FACTS.items():
+        ours, printed = meshes[fact].map(form.format), meshes[f"published_{fact}"].map(form.format)
+        table[title.replace("# ", "").lower()] = ours + " *(" + printed + ")*"
+    return markdown_table(pd.DataFrame(table))
+
+
+def cells_beside_print(root: Path, name: str) -> str:
+    """Format one of Tables 2 to 5 as the paper does *(published in brackets)*.
+
+    Errors are against the labels of the test set, positions root mean squares over the axes.
+
+    Args:
+        root: Published results.
+        name: Name of the table.
+    """
+    cells = read_table(root, name)
+    rows = [_row_title(name, cell) for cell in rows_of(cells)]
+    texts = [_beside_print(cell) for cell in rows_of(cells)]
+    table = cells.assign(row=rows, text=texts).pivot(index="row", columns="model", values="text")
+    ordered = table.loc[[*dict.fromkeys(rows)], list(MODELS)].rename(columns=TITLES)
+    return markdown_table(ordered.rename_axis(index=HEADINGS[name]).reset_index())
+
+
+def _row_title(name: str, cell: Any) -> str:
+    if name == "table2_ground_truth":
+        return label_title(cell.labels)
+    if name == "table3_inconsistencies":
+        return f"{BLOCKS[cell.block]} {row_label(name, cell)}"
+    return f"{scene_title(cell.scene)} {cell.size} ({cell.n_train:,}, {cell.n_test:,})"
+
+
+def _beside_print(cell: Any) -> str:
+    """Format both errors; what the paper misprints is marked."""
+    ours = "failed"
+    if not math.isnan(cell.position_rms_m):
+        ours = f"{cell.position_rms_m:.2f} m, {cell.orientation_deg:.1f}°"
+    if math.isnan(cell.published_position_m):
+        return ours
+    mark = "" if cell.published_flag == "none" else f", {cell.published_flag}"
+    return f"{ours} *({cell.published_position_m:.2f}, {cell.published_orientation_deg:.2f}{mark})*"
+
+
+def making(name: str, profile: str) -> str:
+    """Say how a table is made alone with a profile, and what that takes.
+
+    Args:
+        name: Name of the table.
+        profile: Name of the profile, ``config/<profile>.yaml``; ``mini`` is the default.
+    """
+    cost = _planned(profile)[name]
+    return (
+        f"```\nsnakemake --cores {CORES} results/{profile}/tables/{name}.csv\n```\n\n"
+        f"From nothing: {cost['jobs']:.0f} jobs, about {duration(cost['wall_s'])} on {CORES} cores"
+        f" ({duration(cost['cpu_s'])} of processor time, predicted from measured runs). What an"
+        " earlier run has made is not made again."
+    )
+
+
+@cache
+def _planned(profile: str) -> Mapping[str, Mapping[str, float]]:
+    found = planned_tables(profile, PLANNED_FROM, CORES).T.to_dict()
+    return {str(name): cost for name, cost in found.items()}
