@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 from shlex import quote
 
 from synfeal.cli.options import command, keywords, option
+
+# Where the map finds fewer of the pictures that it was tried on, something is wrong with it.
+EXPECTED_SHARE = 0.5
+
+log = logging.getLogger("synfeal")
 
 
 @command(
@@ -55,6 +61,13 @@ def build(arguments: argparse.Namespace) -> None:
     if check["position_m"] is not None:
         errors = f", {check['position_m']:.3f} m / {check['orientation_deg']:.2f} degrees (medians)"
     print(f"{check['localized']} of {check['pictures']} {check['kind']} localized{errors}")
+    if check["localized"] < EXPECTED_SHARE * check["pictures"]:
+        log.warning(
+            "%s: the map finds fewer than half of the %s, and will find no more of other"
+            " photographs; the report shows what it was made of",
+            arguments.out,
+            check["kind"],
+        )
     if record.get("localizer"):
         learned = record["localizer"]
         print(

@@ -54,7 +54,7 @@ DETAIL: Literal["full"] = "full"
 USUAL_FRAMES = 300  # frames of a capture
 # The network of the default size is off by 5 to 10 per cent of the extent of the cameras: 12 cm in
 # a kitchen of 3 m, 3 m in a corridor of 30 m, where the map is off by 3 cm.
-LEARNABLE_M = 8.0
+LEARNABLE_M, EXPECTED_SHARE = 8.0, 0.08
 
 
 @dataclass(frozen=True)
@@ -248,7 +248,7 @@ def _render_scan(job: PlaceJob, place: Place, run: _Run) -> tuple[Known, dict[st
     capture_record = read_capture_record(place.frames) or {}
     choice = choose(frames, float(capture_record["camera"]["depth"]["fx"]))
     if job.train:
-        warn_of_size(choice.extent_m)
+        tell_of_network(choice.extent_m, run.say)
     with run.stage(SCAN, place.scan, "scan") as due:
         if due:
             scan(
@@ -297,19 +297,21 @@ def _render_mesh(job: PlaceJob, place: Place, run: _Run) -> Known:
             )
     if job.train:
         poses = synfeal.open_dataset(place.rendered).train.world_from_cam
-        warn_of_size(float(np.ptp(poses[:, :3, 3], axis=0).max()))
+        tell_of_network(float(np.ptp(poses[:, :3, 3], axis=0).max()), run.say)
     return renderings_of(place)
 
 
-def warn_of_size(extent_m: float) -> None:
-    """Say before the time is spent that a network will learn little of a large place."""
+def tell_of_network(extent_m: float, say: Callable[[str], None]) -> None:
+    """Say before the time is spent how much a network will learn of a place of this size."""
+    expected = (
+        f"the cameras span {extent_m:.1f} m: a network trained on rendered frames will be off by"
+        f" about {EXPECTED_SHARE * extent_m:.1f} m, which is 5 to 10 % of that; the map localizes"
+        " without it"
+    )
     if extent_m > LEARNABLE_M:
-        log.warning(
-            "the cameras span %.0f m: the network of `train` will be off by about %.1f m there,"
-            " which is 5 to 10 %% of the extent; the map localizes without it",
-            extent_m,
-            0.08 * extent_m,
-        )
+        log.warning("%s", expected)
+    else:
+        say(expected)
 
 
 def _train(job: PlaceJob, place: Place, run: _Run) -> dict[str, float] | None:

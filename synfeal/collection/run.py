@@ -148,9 +148,9 @@ def _way_in(scene: SceneConfig) -> str:
 def _way_to_see_more(scene: SceneConfig) -> str:
     """Name what has not been tried yet."""
     if scene.sampling_box is None:
-        return "a `box` keeps them inside (synfeal inspect suggests one)"
+        return "a `box` of synfeal collect keeps them inside (synfeal inspect suggests one)"
     if (scene.min_seen or 0.0) < SEES_MOST:
-        return f"`min_seen={SEES_MOST:g}` refuses views of that"
+        return f"`min_seen={SEES_MOST:g}` of synfeal collect refuses views of that"
     return "narrower bounds of `pitch_deg`, or a mesh with fewer holes, show less of that"
 
 

@@ -12,8 +12,9 @@ import pandas as pd
 import pytest
 from PIL import ExifTags, Image
 
+from baselines import api
 from baselines.places import choices
-from baselines.places.build import warn_of_size
+from baselines.places.build import tell_of_network
 from baselines.places.choices import choose
 from baselines.places.place import Place, open_map
 from baselines.places.report import plan_of
@@ -104,7 +105,7 @@ def test_the_report_says_what_was_measured(place):
     assert page.count("<circle") == 40
     assert "data:image/jpeg;base64" in page
     assert "sensed by the device" in page
-    assert "40 of 80 frames have no photograph" in page
+    assert "<dt>noted</dt><dd>40 of 80 frames have no photograph" in page
 
 
 def test_the_report_plots_stated_errors(place):
@@ -234,11 +235,23 @@ def test_the_report_of_a_mesh_speaks_of_renderings(meshed):
     assert "The scan beside photographs" not in page
 
 
-def test_a_large_place_is_said_to_be_too_much_for_a_network(caplog):
-    warn_of_size(3.0)
+def test_what_a_network_will_learn_is_told_and_too_large_a_place_warned_of(caplog):
+    told = []
+    tell_of_network(3.0, told.append)
+    assert "off by about 0.2 m" in told[0]
     assert not caplog.messages
-    warn_of_size(30.0)
+    tell_of_network(30.0, told.append)
+    assert len(told) == 1
     assert "off by about 2.4 m" in caplog.text
+
+
+def test_a_map_that_finds_little_is_warned_of(tmp_path, caplog, monkeypatch):
+    for found, warned in ((7, True), (8, False)):
+        check = {"localized": found, "pictures": 15, "kind": "renderings", "position_m": None}
+        monkeypatch.setattr(api, "build", lambda *_, check=check, **__: {"check": check})
+        caplog.clear()
+        assert main(["build", "duck.glb", "--out", str(tmp_path / "duck")]) == 0
+        assert ("fewer than half of the renderings" in caplog.text) is warned
 
 
 def frames_of(tmp_path, depth_mm, extent_m, count) -> PosedFrames:
