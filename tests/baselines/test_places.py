@@ -233,6 +233,7 @@ def test_the_report_of_a_mesh_speaks_of_renderings(meshed):
     page = (meshed / "report.html").read_text()
     assert "of 15 renderings of the mesh" in page
     assert "The scan beside photographs" not in page
+    assert '<span class="whole">--out poses.csv</span>' in page
 
 
 def test_what_a_network_will_learn_is_told_and_too_large_a_place_warned_of(caplog):
