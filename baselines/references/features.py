@@ -41,12 +41,12 @@ class Features(ByFrame):
     Attributes:
         slope: (K, 2) x / z and y / z of the rays they lie on, lens distortion removed.
         depth_m: (K,) along the optical axis, inf where there is none; of no use for test frames.
-        descriptor: (K, 128) uint8.
+        descriptor: (K, D) as they are stored: of SIFT (K, 128) uint8.
     """
 
     slope: Array
     depth_m: Array
-    descriptor: NDArray[np.uint8]
+    descriptor: NDArray[Any]
 
     @property
     def frame(self) -> NDArray[np.int64]:

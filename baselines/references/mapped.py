@@ -30,6 +30,7 @@ from pydantic import ValidationError
 from baselines.references.arrays import Vectors, read_arrays, write_arrays
 from baselines.references.descriptors import CHUNK, Vlad
 from baselines.references.features import Features
+from baselines.references.local_features import CONTRAST, MAX_FEATURES, LocalFeatures, Sift
 from baselines.references.map_frames import MapFrames, MeshFile
 from baselines.references.repeats import PosedFeatures, Repeats, find_repeats
 from baselines.references.triangulated import triangulated
@@ -66,9 +67,6 @@ REPEATS = "repeats.npz"
 # Whether the frames of a map are photographs; maps of earlier versions do not say.
 PHOTOGRAPHS = "photographs"
 VIEW_PX = 64  # side of what retrieval sees of a frame, squeezed into a square
-# Most features of a frame, and their least contrast (OpenCV's default is 0.04): rendered surfaces
-# are smoother than photographs of them.
-MAX_FEATURES, CONTRAST = 1000, 0.006
 FEWEST_FEATURES = 100  # in a map; fewer cannot find a photograph
 REMEDY = "make the map again with synfeal map"
 
@@ -122,30 +120,6 @@ class StructureMap:
         return quat_wxyz_of(self.world_from_cam)
 
 
-def detector(max_features: int = MAX_FEATURES) -> Any:
-    """Create the SIFT detector that maps and photographs share."""
-    cv2.setNumThreads(1)
-    return cv2.SIFT.create(max_features, contrastThreshold=CONTRAST, enable_precise_upscale=True)
-
-
-def detect(sift: Any, grey: NDArray[np.uint8]) -> tuple[Array, NDArray[np.uint8]]:
-    """Find features of an image.
-
-    Args:
-        sift: Detector, as :func:`detector` returns it.
-        grey: Grey values (H, W).
-
-    Returns:
-        Positions (k, 2) in pixels, the first pixel's centre at (0.5, 0.5), and descriptors
-        (k, 128).
-    """
-    keypoints, descriptor = sift.detectAndCompute(grey, None)
-    if descriptor is None:
-        return np.zeros((0, 2)), np.zeros((0, 128), np.uint8)
-    pixel = np.array([point.pt for point in keypoints], dtype=np.float64) + 0.5
-    return pixel, descriptor.astype(np.uint8)
-
-
 def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
     """Build a map of posed frames, and write it.
 
@@ -164,7 +138,7 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
     if frames.has_depth:
         check_depth(frames.posed_depth)
     began = time.perf_counter()
-    features, views = _read_frames(frames)
+    features, views = read_frames(frames, Sift())
     _refuse_few(features, frames)
     torch.set_num_threads(1)
     vlad = Vlad.learn(views, seed)
@@ -230,9 +204,19 @@ def _refuse_few(features: Features, frames: MapFrames) -> None:
     )
 
 
-def _read_frames(frames: MapFrames) -> tuple[Features, NDArray[np.uint8]]:
-    """Read features, with depth if frames have it, and views (N, 64, 64, 3) for retrieval."""
-    sift = detector()
+def read_frames(frames: MapFrames, kind: LocalFeatures) -> tuple[Features, NDArray[np.uint8]]:
+    """Read the frames of a map.
+
+    Args:
+        frames: The frames.
+        kind: Finds their local features.
+
+    Returns:
+        Features, with depth if frames have it, and views (N, 64, 64, 3) for retrieval.
+
+    Raises:
+        InputError: An image cannot be read.
+    """
     views = np.empty((len(frames), VIEW_PX, VIEW_PX, 3), np.uint8)
     found = []
     with Progress(len(frames), "map") as progress:
@@ -241,7 +225,7 @@ def _read_frames(frames: MapFrames) -> tuple[Features, NDArray[np.uint8]]:
             image = frames.read_color(index)
             views[index] = fit_frame(Image.fromarray(image), VIEW_PX, "whole")
             grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
-            pixel, descriptor = detect(sift, grey)
+            pixel, descriptor = kind.detect(grey)
             slope = normalised_of_pixels(frames.camera, pixel)
             depth_m = np.zeros(len(slope))  # until it is triangulated
             if frames.has_depth:

@@ -24,11 +24,10 @@ from baselines.references.confidence import (
     patches_of,
     support_of,
 )
-from baselines.references.correspondences import mutual_matches
-from baselines.references.features import roots_of
-from baselines.references.mapped import VIEW_PX, StructureMap, detect, detector
+from baselines.references.local_features import Described, LocalFeatures, Sift
+from baselines.references.mapped import VIEW_PX, StructureMap
 from baselines.references.pose_covariance import Spread, pose_covariance, spread_of
-from baselines.references.repeats import MAX_ERROR_PX, METRES_PER_RADIAN, RATIO
+from baselines.references.repeats import MAX_ERROR_PX, METRES_PER_RADIAN
 from baselines.references.structure import (
     missed_px,
     pinhole,
@@ -67,14 +66,14 @@ class Photograph(NamedTuple):
 
     Attributes:
         slope: x / z and y / z (k, 2) of the rays of its features, distortion removed.
-        roots: RootSIFT descriptors (k, 128).
+        vector: Descriptors (k, D) as they are compared: RootSIFT (k, 128).
         view: It as the map's camera would have seen it (64, 64, 3), squeezed into a square.
         grey: Grey values (H, W) as the map's camera would have seen them; edges are continued.
         shown: Pixels (H, W) of these that the photograph shows.
     """
 
     slope: Array
-    roots: NDArray[np.float32]
+    vector: NDArray[np.float32]
     view: NDArray[np.uint8]
     grey: NDArray[np.uint8]
     shown: NDArray[np.bool_]
@@ -130,12 +129,15 @@ class Finder:
     Args:
         place: The map.
         seed: Seed of RANSAC's samples.
+        kind: Local features that the map holds; None for those of :func:`build_map`.
     """
 
-    def __init__(self, place: StructureMap, seed: int = 0) -> None:
+    def __init__(
+        self, place: StructureMap, seed: int = 0, kind: LocalFeatures | None = None
+    ) -> None:
         self._place = place
         self._seed = seed
-        self._sift = detector()
+        self._kind: LocalFeatures = Sift() if kind is None else kind
         self._pinhole = pinhole(place.camera)
         self._focal_px = np.array(place.camera.intrinsics[:2])
 
@@ -155,7 +157,7 @@ class Finder:
             pixels = np.asarray(smaller, dtype=np.uint8)
         scale = size / full
         grey = np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
-        pixel, descriptor = detect(self._sift, grey)
+        pixel, descriptor = self._kind.detect(grey)
         centre = np.array([calibration.cx, calibration.cy])
         slope = undistort((pixel / scale - centre) / focal_px, calibration.distortion)
         known = np.isfinite(slope).all(axis=1)
@@ -164,7 +166,7 @@ class Finder:
         places = _places(calibration, camera, camera.width, camera.height)
         return Photograph(
             slope=slope[known],
-            roots=roots_of(descriptor[known]),
+            vector=self._kind.vectors(descriptor[known]),
             view=_sampled(pixels, cells * scale),
             grey=_looked_up(grey, places * scale),
             shown=np.asarray(((places > 0) & (places < full)).all(axis=-1)),
@@ -179,7 +181,7 @@ class Finder:
         """
         if among is None:
             among = np.arange(len(self._place))
-        matched = _Matched(photograph, self._place, self._focal_px)
+        matched = _Matched(photograph, self._place, self._focal_px, self._kind)
         candidates = self._candidates(matched, among)
         places = [self._settled(matched, attempt, among) for attempt in candidates]
         if not places:
@@ -435,11 +437,16 @@ class _Matched:
         photograph: The photograph.
         place: The map.
         focal_px: Focal lengths (2,) of the map's frames.
+        kind: Local features of both.
     """
 
-    def __init__(self, photograph: Photograph, place: StructureMap, focal_px: Array) -> None:
+    def __init__(
+        self, photograph: Photograph, place: StructureMap, focal_px: Array, kind: LocalFeatures
+    ) -> None:
         self.photograph = photograph
         self._place = place
+        self._kind = kind
+        self._focal_px = focal_px
         self._pixel = photograph.slope * focal_px
         self._by_frame: dict[int, tuple[Rows, Rows]] = {}
 
@@ -457,7 +464,14 @@ class _Matched:
         """Match features of the photograph (m,) with features of the map (m,)."""
         if frame not in self._by_frame:
             features = self._place.features
-            own, other = mutual_matches(self.photograph.roots, features.roots(frame), RATIO)
+            rows = features.of(frame)
+            own, other = self._kind.match(
+                Described(self._pixel, self.photograph.vector),
+                Described(
+                    pixel=features.slope[rows] * self._focal_px,
+                    vector=self._kind.vectors(features.descriptor[rows]),
+                ),
+            )
             self._by_frame[frame] = own, features.start[frame] + other
         return self._by_frame[frame]
 

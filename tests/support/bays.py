@@ -69,7 +69,7 @@ class Bays:
         roots = np.sqrt(self.last / self.last.sum(1, keepdims=True))
         return Photograph(
             slope=self.points[:, :2] / self.points[:, 2:],
-            roots=roots.astype(np.float32),
+            vector=roots.astype(np.float32),
             view=np.zeros((64, 64, 3), np.uint8),
             grey=np.zeros((height, width), np.uint8),
             shown=np.ones((height, width), np.bool_),
