@@ -84,6 +84,10 @@ LARGER = 2
 LEAST_COSINE = 0.82
 ANY_RATIO = 2.0  # lets every mutual match pass
 SEED = 0
+HEADER = (
+    "| place | features | localized | error (median) | within 5 cm, 5° (95 %)"
+    " | gained / lost, points (95 %) | off by more than 50 cm | a frame of the map | a photograph |"
+)
 
 
 class XFeat:
@@ -324,7 +328,7 @@ def main() -> None:
         known = pd.read_csv(given.table)
         rows = pd.concat([known[known["case"] != given.case], rows], ignore_index=True)
     write_frame(given.table, rows)
-    print(rows.to_string())
+    print(summary(rows))
 
 
 def measure(
@@ -444,6 +448,30 @@ def row_of(found: Measured, sift: Measured) -> dict[str, float | int]:
             f"{name}_mcnemar_p": round(chance, 4),
         }
     return row
+
+
+def summary(table: pd.DataFrame) -> str:
+    """Write the table for a page, in Markdown."""
+    lines = [HEADER, "|---" * HEADER.count(" | ") + "|---|"]
+    for row in table.to_dict("records"):
+        low, share, high = (
+            100 * row[name] for name in ("within_low", "within_5cm_5deg", "within_high")
+        )
+        change = "|"
+        if row["features"] != "sift":
+            change = (
+                f"{row['within_gained']} / {row['within_lost']}"
+                f" ({100 * row['within_change_low']:+.0f} to"
+                f" {100 * row['within_change_high']:+.0f}) |"
+            ).replace("-", "−")
+        lines.append(
+            f"| {row['case']} | {row['features']} | {row['localized']} of {row['photographs']} |"
+            f" {100 * row['median_m']:.1f} cm / {row['median_deg']:.2f}° |"
+            f" {share:.0f} % ({low:.0f} to {high:.0f}) | {change}"
+            f" {row['off_over_50cm']} | {row['map_s'] / row['map_frames']:.2f} s |"
+            f" {row['photograph_s']:.2f} s |"
+        )
+    return "\n".join(lines)
 
 
 def _change_limits(change: Array) -> tuple[float, float]:
