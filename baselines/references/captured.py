@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -12,6 +13,8 @@ from baselines.references.map_frames import MapFrames
 from synfeal.captures.formats import is_capture, read_capture
 from synfeal.captures.unpack import unpack
 from synfeal.records.progress import Progress
+
+log = logging.getLogger("synfeal")
 
 # Layouts that are read as they lie.
 SEQUENCES = ("7scenes", "tum")
@@ -57,4 +60,6 @@ def as_sequence(path: Path) -> Iterator[Sequence]:
         folder = Path(temporary) / "frames"
         with Progress(len(capture), "unpacked") as progress:
             done = unpack(capture, folder, longest_px=LONGEST_PX, on_frame=progress.update)
+        for note in done.notes:
+            log.warning("%s: %s", path, note)
         yield Sequence(path, folder, done.names)
