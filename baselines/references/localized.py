@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-import torch
 
 from baselines.references.confidence import LEAST_CONFIDENCE, check_confidence
 from baselines.references.map_localizer import (
@@ -24,6 +23,7 @@ from baselines.references.map_localizer import (
 )
 from baselines.references.mapped import StructureMap, read_map
 from baselines.references.redrawn import read_redrawn
+from baselines.references.single_thread import single_thread
 from baselines.references.stated_errors import read_scale
 from baselines.training.localize import open_picture
 from baselines.training.pictures import check_out, find_pictures, refuse_mixed_sizes
@@ -70,6 +70,7 @@ class LocalizedInMap(NamedTuple):
     states_errors: bool
 
 
+@single_thread()
 def localize_in_map(
     folder: Path,
     named: Sequence[Path],
@@ -105,7 +106,6 @@ def localize_in_map(
     pictures = find_pictures(named)
     check_out(out, pictures)
     refuse_mixed_sizes(camera, pictures)
-    torch.set_num_threads(1)
     taken_s: list[float] = []
     with ExitStack() as opened:
         refiner = None

@@ -33,6 +33,7 @@ from baselines.references.features import Features
 from baselines.references.local_features import CONTRAST, MAX_FEATURES, LocalFeatures, Sift
 from baselines.references.map_frames import MapFrames, MeshFile
 from baselines.references.repeats import PosedFeatures, Repeats, find_repeats
+from baselines.references.single_thread import single_thread
 from baselines.references.triangulated import triangulated
 from synfeal.camera.calibration import Calibration
 from synfeal.camera.projection import normalised_of_pixels
@@ -120,6 +121,7 @@ class StructureMap:
         return quat_wxyz_of(self.world_from_cam)
 
 
+@single_thread()
 def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
     """Build a map of posed frames, and write it.
 
@@ -140,7 +142,6 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
     began = time.perf_counter()
     features, views = read_frames(frames, Sift())
     _refuse_few(features, frames)
-    torch.set_num_threads(1)
     vlad = Vlad.learn(views, seed)
     vectors = vlad.describe(views)
     if not frames.has_depth:

@@ -36,6 +36,7 @@ from baselines.references.map_frames import MapFrames
 from baselines.references.mapped import RECORD, StructureMap
 from baselines.references.photographs import Finder
 from baselines.references.pose_covariance import Spread
+from baselines.references.single_thread import single_thread
 from baselines.training.photometric import PhotometricRandomisation
 from synfeal.camera.calibration import Calibration
 from synfeal.config.effects import NoiseConfig
@@ -315,6 +316,7 @@ def add_photographs(folder: Path, error_m: Array, error_deg: Array, stated: Arra
     write_json(folder / FILE, trial.model_dump(mode="json"))
 
 
+@single_thread()
 def try_map(place: StructureMap, frames: MapFrames, map_sha256: str, seed: int) -> Trial:
     """Show frames of a map to the rest of it, under another light, lens and sensor.
 
@@ -324,7 +326,6 @@ def try_map(place: StructureMap, frames: MapFrames, map_sha256: str, seed: int) 
         map_sha256: Hash that the map is known by.
         seed: Of light, lens and sensor, and of RANSAC's samples.
     """
-    torch.set_num_threads(1)
     finder = Finder(place, seed)
     randomise = PhotometricRandomisation(PHOTOGRAPHIC, seed)
     calibration = Calibration.of_camera(place.camera)

@@ -32,10 +32,15 @@ def serve(job: ServeJob, say: Callable[[str], object] = SAY) -> None:
     for module in MODULES:
         if find_spec(module) is None:
             raise InputError(f"serving needs {module}", INSTALL)
+    from baselines.references.single_thread import single_thread
     from baselines.serving.place import ServedPlace
     from baselines.serving.server import server_of
 
-    with listening(job.host, job.port) as listener, ServedPlace(job) as place:
+    with (
+        single_thread(),
+        listening(job.host, job.port) as listener,
+        ServedPlace(job) as place,
+    ):
         server = server_of(place, job)
         port = listener.getsockname()[1]
         host = f"[{job.host}]" if ":" in job.host else job.host
