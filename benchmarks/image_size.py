@@ -186,7 +186,7 @@ NETWORK_SCHEMA = {
     "images": COUNT,
     "position_m": NUMBER,
 }
-SCHEMA = {name: COUNT if kind == "int" else NUMBER for name, kind in Row.__annotations__.items()}
+SCHEMA = dict.fromkeys(Row._fields, NUMBER)
 MARKS = {"posenet": "o", "poselstm": "s", "posenet2": "v"}
 
 
@@ -205,7 +205,7 @@ def draw(folder: Path) -> None:
 
 def figure_of(structure: pd.DataFrame, networks: pd.DataFrame) -> Figure:
     """Draw median position errors over the width of the image, both logarithmic."""
-    figure = Figure(figsize=(7.5, 4.6), layout="constrained")
+    figure = Figure(figsize=(7.5, 5.2), layout="constrained")
     axes = figure.subplots()
     width_px, middle = structure["width_px"], structure["position_m"]
     ends = [middle - structure["position_m_low"], structure["position_m_high"] - middle]
@@ -217,32 +217,35 @@ def figure_of(structure: pd.DataFrame, networks: pd.DataFrame) -> Figure:
         marker="D",
         lw=1.5,
         capsize=3,
-        label=f"matched features, map of {structure['map_frames'].iloc[0]:,} frames",
+        label=f"matched features, map of {int(structure['map_frames'].iloc[0]):,} frames",
     )
     for _, own in networks.groupby(["localizer", "input_px"], sort=False):
         row = own.iloc[0]
         name = str(row["localizer"])
-        width = "full" if row["width"] == 1 else f"{row['width']:g} of the"
+        width = "full width" if row["width"] == 1 else f"{row['width']:g} of its width"
         axes.plot(
             own["input_px"],
             CENTIMETRES * own["position_m"],
             MARKS[name],
             color=VERMILION if row["input_px"] < 100 else GREEN,
             mec="white",
+            mew=0.5,
             ms=8,
             ls="none",
-            label=f"{TITLES[name]}, {width} width, {row['images']:,} images",
+            label=f"{TITLES[name]}, {width}, {row['images']:,} images",
         )
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xticks([64, 88, 160, 224, 320], ["64", "88", "160", "224", "320"])
     axes.minorticks_off()
-    axes.set_yticks([0.3, 1, 3, 10, 30, 100], ["0.3", "1", "3", "10", "30", "100"])
+    axes.set_yticks([0.1, 0.3, 1, 3, 10, 30, 100], ["0.1", "0.3", "1", "3", "10", "30", "100"])
+    axes.set_xlim(58, 350)
+    axes.set_ylim(0.1, 100)
     axes.set_xlabel("width of the image, pixels")
     axes.set_ylabel("median position error, cm")
     axes.grid(color="0.92")
     axes.spines[["top", "right"]].set_visible(False)
-    figure.legend(loc="outside right upper", fontsize=8)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
     return figure
 
 

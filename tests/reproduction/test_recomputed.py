@@ -131,6 +131,31 @@ def test_the_first_lines_of_the_readme_follow_from_the_tables():
     assert told[:8] == pytest.approx([*ours[0], *ours[1], *printed], abs=0.51)
 
 
+def test_matching_by_size_of_the_image_is_told_as_it_was_measured():
+    benchmarks = ROOT / "results/benchmarks"
+    matched = {int(row["width_px"]): row for row in rows_of(benchmarks / "image_size.csv")}
+    cm = {
+        name: 100 * float(matched[64][name]) for name in matched[64] if name.startswith("position")
+    }
+    ends = "{position_m:.1f} cm ({position_m_low:.1f} to {position_m_high:.1f})".format(**cm)
+    networks = [
+        100 * float(row["position_m"])
+        for row in rows_of(benchmarks / "gpu_errors.csv")
+        if (row["localizer"], row["input_px"]) == ("posenet2", "64")
+    ]
+    assert len(networks) == 6
+    told = f"{min(networks):.0f} to {max(networks):.0f}"
+    objections, results = (
+        (ROOT / f"docs/{name}.md").read_text() for name in ("objections", "results")
+    )
+    assert f"matching is off by {ends}, PoseNet2 of 64 × 64 by {told} cm" in objections
+    times = [network / cm["position_m"] for network in networks]
+    assert f"{min(times):.0f} to {max(times):.0f} times" in objections
+    small = 100 * float(matched[88]["position_m"])
+    assert f"off by {ends}, of 88 × 66 by {small:.1f}, PoseNet2 of 64 × 64 by {told}." in results
+    assert f"it is off by {cm['position_m']:.1f} cm" in (ROOT / "README.md").read_text()
+
+
 def ranks(values):
     """Ranks from 1; equal values share the mean of theirs."""
     ordered = sorted(values)
