@@ -52,6 +52,8 @@ def build(arguments: argparse.Namespace) -> None:
     from baselines.api import build as make
     from baselines.places.place import Place
 
+    if arguments.train:  # minutes, of which it tells how many are left
+        logging.getLogger("baselines.training").setLevel(logging.INFO)
     try:
         record = make(**keywords(arguments, build))
     except KeyboardInterrupt as interrupt:

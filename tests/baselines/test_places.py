@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import shutil
 import sys
 from pathlib import Path
@@ -244,6 +245,24 @@ def test_what_a_network_will_learn_is_told_and_too_large_a_place_warned_of(caplo
     tell_of_network(30.0, told.append)
     assert len(told) == 1
     assert "off by about 2.4 m" in caplog.text
+
+
+@pytest.mark.parametrize("options", [(), ("--train",)])
+def test_a_network_that_learns_shows_how_long_it_takes(options, tmp_path, caplog, monkeypatch):
+    training = logging.getLogger("baselines.training")
+    before = training.level
+    training.setLevel(logging.NOTSET)
+
+    def made(*_: object, **__: object) -> dict:
+        training.getChild("selection").info("64 of 30000 samples, 90 s left")
+        return {"check": {"localized": 9, "pictures": 9, "kind": "renderings", "position_m": None}}
+
+    monkeypatch.setattr(api, "build", made)
+    try:
+        assert main(["build", "room.glb", "--out", str(tmp_path / "room"), *options]) == 0
+    finally:
+        training.setLevel(before)
+    assert ("90 s left" in caplog.text) is bool(options)
 
 
 def test_a_map_that_finds_little_is_warned_of(tmp_path, caplog, monkeypatch):
