@@ -63,9 +63,11 @@ def _of_runs(judged: Sequence[Judged]) -> dict[str, str]:
 
 
 def _cells(row: Mapping[str, str], verdict: str, runs: str) -> dict[str, str]:
-    measured = BESIDE.split(row.get("measured_true", ""))[0]
-    limits = row.get("interval_true") or "–"
-    return {"Ours": measured, "95 % limits": limits, "Verdict": f"**{verdict}**", "Run": runs}
+    ours = BESIDE.split(row.get("measured_true", ""))[0]
+    if limits := row.get("interval_true"):
+        ours += f"; limits: {limits}"
+    told = f"**{verdict}** ({runs})" if runs else f"**{verdict}**"
+    return {"Ours (95 % limits)": ours, "Verdict (run)": told}
 
 
 def _with_minus(text: str) -> str:

@@ -86,7 +86,7 @@ def test_no_verdict_of_several_runs_is_passed_over(tmp_path):
     assert is_decided(judged)
     told = claims_table(tmp_path / "labels").splitlines()
     (line,) = (line for line in told if line.startswith("| C2 |"))
-    assert line.endswith("| **holds** | `b`; open in `labels`, `a` |")
+    assert line.endswith("| **holds** (`b`; open in `labels`, `a`) |")
     text = fresh_claims(tmp_path)
     assert all(text.count(f"| `{profile}` |") for profile in ("labels", "a", "b"))
     assert "C2" not in text.split("What would decide the others")[1]
@@ -99,7 +99,7 @@ def test_runs_that_contradict_each_other_leave_a_claim_open(tmp_path):
     assert all(own.decided for own in judged)
     assert not is_decided(judged)
     told = claims_table(tmp_path / "labels")
-    assert "| **runs contradict each other** | `labels`, also `a` |" in told
+    assert "| **runs contradict each other** (`labels`, also `a`) |" in told
     left = fresh_claims(tmp_path).split("What would decide the others")[1]
     assert "C2" in left
 
