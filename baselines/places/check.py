@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,13 +15,19 @@ import synfeal
 from baselines.places.place import Place
 from baselines.references.localized import localize_in_map
 from baselines.references.map_localizer import FOUND
-from baselines.references.stated_errors import add_photographs, held_out_coverage, read_trial
+from baselines.references.stated_errors import (
+    add_photographs,
+    held_out_coverage,
+    photographs_coverage,
+    read_trial,
+    usual_radius_m,
+)
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.dataset.manifest import MANIFEST
 from synfeal.dataset.pose_table import STATED
 from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.errors import InputError
-from synfeal.evaluation.coverage import coverage
+from synfeal.evaluation.coverage import Coverage, coverage
 from synfeal.evaluation.metrics import ORIENTATION, POSITION
 from synfeal.geometry.poses import pose_error, pose_from_quat
 
@@ -109,6 +115,7 @@ def check_of(place: Place, known: Known) -> dict[str, Any]:
         "orientation_deg": _percentile(angle_deg[found], 50),
         "within_5cm_5deg": float(close.mean()),
         "stated": _stated_of(checked),
+        "halves": _levels_of(photographs_coverage(read_trial(place.map))),
         "places": [
             {
                 "position_m": pose[:3, 3].round(3).tolist(),
@@ -123,16 +130,21 @@ def trial_of(place: Place) -> dict[str, Any]:
     """Say how the map did on frames left out of it.
 
     Returns:
-        Counts, and how the errors that one half states fit those of the other; nothing of that
-        where there are few.
+        Counts; how the errors that one half states fit those of the other, nothing of that where
+        there are few; the 95 % radius of the position that poses state, the median.
     """
     trial = read_trial(place.map)
     found = held_out_coverage(trial)
     return {
         "pictures": trial.tried,
         "localized": len(trial.position_m),
-        "stated": {name: [one._asdict() for one in levels] for name, levels in found.items()},
+        "stated": _levels_of(found),
+        "usual_95_m": usual_radius_m(trial),
     }
+
+
+def _levels_of(found: Mapping[str, Sequence[Coverage]]) -> dict[str, list[dict[str, float]]]:
+    return {name: [one._asdict() for one in levels] for name, levels in found.items()}
 
 
 class _Checked(NamedTuple):

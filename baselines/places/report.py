@@ -22,7 +22,9 @@ from synfeal.records.files import atomic_path, read_json
 WIDEST_PX, QUALITY = 1600, 85
 PLAN_PX, EDGE_PX = 640.0, 14.0
 # Side of the plot of stated errors, and the share at which its axes begin.
-STATED_PX, LEAST_SHARE = 260.0, 0.4
+STATED_PX, LEAST_SHARE = 300.0, 0.4
+# Edge of that plot on the sides of its labels, and the shares that are labelled.
+LABELS_PX, TICKS = 60.0, (0.5, 0.7, 0.9)
 SCALE_STEPS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 
 
@@ -86,7 +88,8 @@ def write_report(place: Place, record: dict[str, Any]) -> None:
         plan_px=PLAN_PX,
         lines=coverage_lines(record),
         stated_px=STATED_PX,
-        edge_px=EDGE_PX,
+        ends_px=(_along_px(LEAST_SHARE), _along_px(1.0)),
+        ticks=[(share, _along_px(share)) for share in TICKS],
         close_cm=100 * CLOSE_M,
         folder=place.folder,
     )
@@ -97,12 +100,16 @@ def write_report(place: Place, record: dict[str, Any]) -> None:
 def coverage_lines(record: dict[str, Any]) -> tuple[CoverageLine, ...]:
     """Draw the share of errors within stated radii against the share that these are said to hold.
 
+    Of photographs, as one half of them widens the radii of the other; where they are too few for
+    that, by the radii of frames of the map alone.
+
     Args:
         record: Content of ``place.json``.
     """
     lines = []
-    for of in ("trial", "check"):
-        for name, levels in record[of]["stated"].items():
+    of_pictures = record["check"].get("halves") or record["check"]["stated"]
+    for of, found in (("trial", record["trial"]["stated"]), ("check", of_pictures)):
+        for name, levels in found.items():
             corners = [(_along_px(one["level"]), _along_px(one["held"])) for one in levels]
             points = " ".join(f"{x:.1f},{STATED_PX - y:.1f}" for x, y in corners)
             lines.append(CoverageLine(f"{of} {name.partition('_')[0]}", points))
@@ -112,7 +119,7 @@ def coverage_lines(record: dict[str, Any]) -> tuple[CoverageLine, ...]:
 def _along_px(share: float) -> float:
     """Place a share on an axis of the plot of stated errors."""
     along = (max(share, LEAST_SHARE) - LEAST_SHARE) / (1.0 - LEAST_SHARE)
-    return EDGE_PX + (STATED_PX - 2 * EDGE_PX) * along
+    return LABELS_PX + (STATED_PX - LABELS_PX - EDGE_PX) * along
 
 
 def picture_data(path: Path) -> str:

@@ -240,6 +240,45 @@ def held_out_coverage(tried: Poses) -> dict[str, list[Coverage]]:
     return found
 
 
+def photographs_coverage(trial: Trial) -> dict[str, list[Coverage]]:
+    """Judge the radii that photographs of a capture state, if the other half of them widens these.
+
+    Returns:
+        Coverage of ``position_m`` and of ``orientation_deg``; nothing where a half has too few.
+    """
+    seen = trial.photographs
+    if seen is None or len(seen.position_m) < 2 * FEWEST:
+        return {}
+    stated = np.empty((len(seen.position_m), 4))
+    for half in (0, 1):
+        others = Poses(**{name: one[1 - half :: 2] for name, one in seen})
+        scale = ErrorScale(trial.model_copy(update={"photographs": others}))
+        stated[half::2] = [scale.stated(spread) for spread in _spreads(seen)[half::2]]
+    return {
+        POSITION: coverage(np.array(seen.position_m), *stated.T[:2]),
+        ORIENTATION: coverage(np.array(seen.orientation_deg), *stated.T[2:]),
+    }
+
+
+def usual_radius_m(trial: Trial) -> float | None:
+    """Return the 95 % radius of the position that most of what was tried states, the median.
+
+    Of the photographs of a capture, if there are; None where too few poses were found.
+    """
+    if len(trial.position_m) < FEWEST:
+        return None
+    scale = ErrorScale(trial)
+    radii_m = [
+        scale.stated(spread).position_95_m for spread in _spreads(trial.photographs or trial)
+    ]
+    return float(np.median(radii_m)) if radii_m else None
+
+
+def _spreads(poses: Poses) -> list[Spread]:
+    pairs = zip(poses.position_spread_m, poses.orientation_spread_deg, strict=True)
+    return [Spread(*pair) for pair in pairs]
+
+
 def read_scale(folder: Path) -> ErrorScale | None:
     """Read the scale of a map's errors.
 

@@ -123,6 +123,10 @@ def test_the_report_plots_stated_errors(place):
     plotted = [of for of in ("trial", "check") if record[of]["stated"]]
     assert page.count("<polyline") == 2 * len(plotted)
     assert page.count('<polyline class="check') == 2
+    assert "said to be within the radius" in page
+    usual_m = table.loc[table["status"] == "localized", "position_95_m"].median()
+    assert record["trial"]["usual_95_m"] >= usual_m * 0.99  # photographs widen, they do not narrow
+    assert f"is {100 * record['trial']['usual_95_m']:.1f} cm, median of the photographs" in page
 
 
 def test_built_again_nothing_is_made_anew(place, capture, capsys):
