@@ -89,6 +89,7 @@ ON_COMMAND_LINES = {
     "reproduction/config/collected.py": "comments of the profile that a command prints",
     "reproduction/plan/gpu.py": "a text that a command prints, which is no function",
     "reproduction/plan/plan.py": "a text that a command prints, which is no function",
+    "reproduction/report/paper_tables.py": "a command that a page shows",
     "reproduction/real/config.py": "options of commands that a rule runs",
     "reproduction/real/down.py": "an option of a command that a rule runs",
     "reproduction/runs/job.py": "answers of jobs, which the command line of Snakemake starts",
