@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -40,21 +41,27 @@ def has_pooled(folder: Path) -> bool:
     return all((folder / name).is_file() for name in (EFFECTS, CLAIMS))
 
 
-def read_effects(path: Path) -> pd.DataFrame:
-    """Read ``claim_effects.csv``: a row for each effect and replication, and the pooled one.
+class PooledTables(NamedTuple):
+    """What replications come to together.
+
+    Attributes:
+        effects: ``claim_effects.csv``: a row for each effect and replication, and the pooled one.
+        verdicts: ``claims.csv``: the verdict on each claim by its id and what errors are against.
+    """
+
+    effects: pd.DataFrame
+    verdicts: dict[tuple[str, str], str]
+
+
+def read_pooled(folder: Path) -> PooledTables:
+    """Read both tables of pooled replications.
 
     Raises:
-        InputError: The table cannot be read.
+        InputError: One cannot be read.
     """
-    return read_frame(path, EFFECTS_SCHEMA, REMEDY)
-
-
-def read_verdicts(path: Path) -> dict[tuple[str, str], str]:
-    """Read ``claims.csv``: the verdict on each claim by its id and what errors are against.
-
-    Raises:
-        InputError: The table cannot be read.
-    """
-    rows = read_frame(path, CLAIMS_SCHEMA, REMEDY)
+    rows = read_frame(folder / CLAIMS, CLAIMS_SCHEMA, REMEDY)
     keys = zip(rows["claim"], rows["against"].fillna(""), strict=True)
-    return dict(zip(keys, rows["verdict"], strict=True))
+    return PooledTables(
+        effects=read_frame(folder / EFFECTS, EFFECTS_SCHEMA, REMEDY),
+        verdicts=dict(zip(keys, rows["verdict"], strict=True)),
+    )

@@ -6,6 +6,7 @@ claim by the one that decides it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -49,17 +50,19 @@ def _of_runs(judged: Sequence[Judged]) -> dict[str, str]:
     """Tell a claim by the run that decides it, else by the first; name those that leave it open."""
     if not judged:
         return _cells({}, NOT_RUN, "")
-    told = next((own for own in judged if own.decided), judged[0])
-    others = [own for own in judged if own is not told]
-    runs = f"`{told.profile}`"
-    if agree := [f"`{own.profile}`" for own in others if own.decided]:
-        runs += f", also {', '.join(agree)}"
-    left_open = [f"`{own.profile}`" for own in others if not own.decided]
-    if left_open and told.decided:
-        runs += f"; open in {', '.join(left_open)}"
-    elif left_open:
-        runs += f", also {', '.join(left_open)}"
-    return _cells(told.row, outcome(judged), runs)
+    deciding = [own for own in judged if own.decided]
+    left_open = [own for own in judged if not own.decided]
+    told, others = (deciding, left_open) if deciding else (left_open, [])
+    runs = _runs(told[:1])
+    if len(told) > 1:
+        runs += f", also {_runs(told[1:])}"
+    if others:
+        runs += f"; open in {_runs(others)}"
+    return _cells(told[0].row, outcome(judged), runs)
+
+
+def _runs(judged: Sequence[Judged]) -> str:
+    return ", ".join(f"`{own.profile}`" for own in judged)
 
 
 def _cells(row: Mapping[str, str], verdict: str, runs: str) -> dict[str, str]:
@@ -72,4 +75,4 @@ def _cells(row: Mapping[str, str], verdict: str, runs: str) -> dict[str, str]:
 
 def _with_minus(text: str) -> str:
     """Put a minus sign where a hyphen stands before a digit."""
-    return text.replace(" -", " −")
+    return re.sub(r"(?<= )-(?=\d)", "−", text)

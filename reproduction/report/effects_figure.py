@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from reproduction.claims.evidence import QUANTITIES
 from reproduction.figures.style import BLUE, VERMILION, Style
-from reproduction.report.reproduced import QUANTITIES, Effect
+from reproduction.report.reproduced import Effect
 from reproduction.report.stamped import digest, stamped_png
 
 TICKS_PERCENT = (-75, -50, 0, 100, 300)

@@ -716,6 +716,11 @@ def change_text(factor: float) -> str:
     return f"{change:+d} %".replace("-", "−") if change else "0 %"
 
 
+def signed(number: float) -> str:
+    """Format a number with its sign, to two digits."""
+    return f"{number:+.2f}".replace("-", "−")
+
+
 def percent(interval: Interval) -> str:
     """Format a factor with its limits as a change in percent."""
     value, low, high = map(change_text, interval)

@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 
 from reproduction.figures.style import BLUE, GREEN, VERMILION, Style
 from reproduction.replications.effects import NETWORKS
-from reproduction.replications.pooling import CLAIMS, EFFECTS, POOLED
-from reproduction.replications.tables import REMEDY, read_effects, read_verdicts
+from reproduction.replications.pooling import POOLED
+from reproduction.replications.tables import REMEDY, read_pooled
 from reproduction.report.stamped import digest, stamped_png, write_stamped
 from synfeal.errors import exit_status
 
@@ -82,7 +82,7 @@ def read_forest(folder: Path) -> Forest:
     Raises:
         InputError: A table cannot be read.
     """
-    table, judged = read_effects(folder / EFFECTS), read_verdicts(folder / CLAIMS)
+    table, judged = read_pooled(folder)
     return Forest(
         rows_in(table, "percent"),
         rows_in(table, "share"),

@@ -19,7 +19,6 @@ from typing import Any
 
 import pandas as pd
 
-from baselines.config.learning import MODELS
 from reproduction.claims.table import claims_markdown
 from reproduction.claims.verdicts import published_claims
 from reproduction.real.findings import real_findings, real_headline, real_short, real_table
@@ -41,7 +40,12 @@ from reproduction.report.forest import read_forest, write_forest
 from reproduction.report.fresh import fresh_claims
 from reproduction.report.paper_cells import TABLES, paper_cells
 from reproduction.report.paper_figure import cells_digest, paper_picture
-from reproduction.report.paper_tables import cells_beside_print, making, meshes_beside_print
+from reproduction.report.paper_tables import (
+    by_localizer,
+    cells_beside_print,
+    making,
+    meshes_beside_print,
+)
 from reproduction.report.pooled import pooled_lines
 from reproduction.report.publish import PUBLISHED, RESULTS
 from reproduction.report.published_claims import read_published, rows_now, rules_note
@@ -53,7 +57,7 @@ from reproduction.runs.results import read_result
 from reproduction.tables.assistance import SCHEMA as ASSISTANCE
 from reproduction.tables.assistance import TOTAL
 from reproduction.tables.label_error import SCHEMA as LABEL_ERROR
-from reproduction.tables.layouts import SOURCES, TITLES, scene_title
+from reproduction.tables.layouts import SOURCES, scene_title
 from reproduction.tables.sheet import markdown_table
 from synfeal.errors import InputError, exit_status
 from synfeal.records.files import write_text
@@ -146,13 +150,14 @@ def size_table(root: Path) -> str:
     cells = read_table(root, "table4_size")
     frames = "(" + cells.n_train.astype(str) + ", " + cells.n_test.astype(str) + ")"
     labels = cells.scene.map(scene_title) + " " + cells["size"] + " " + frames
-    return _localizer_table(cells, "scene, size (frames here)", labels)
+    return by_localizer(cells, "scene, size (frames here)", list(labels), _cell)
 
 
 def labels_table(root: Path) -> str:
     """Format Table 2, the same way."""
     cells = read_table(root, "table2_ground_truth")
-    return _localizer_table(cells, "labels from", cells.labels.map(lambda n: SOURCES.get(n, n)))
+    sources = [SOURCES.get(name, name) for name in cells.labels]
+    return by_localizer(cells, "labels from", sources, _cell)
 
 
 def noise_table(root: Path) -> str:
@@ -224,10 +229,6 @@ def verdicts(root: Path) -> str:
     return "\n".join([claims_table(root), "", *notes])
 
 
-def _making(root: Path, name: str) -> str:
-    return making(name, root.name)
-
-
 PAPERS = {name.partition("_")[0]: name for name in TABLES}  # `table2` to `table5`
 PARTS: dict[str, Callable[[Path], str]] = {
     "found": found,
@@ -246,7 +247,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "verdicts": verdicts,
     "meshes": meshes_beside_print,
     **{part: partial(cells_beside_print, name=name) for part, name in PAPERS.items()},
-    **{part.replace("table", "cost"): partial(_making, name=name) for part, name in PAPERS.items()},
+    **{part.replace("table", "cost"): partial(making, name=name) for part, name in PAPERS.items()},
     "difficulty": lambda root: difficulty(),
     "real": real_findings,
     "real_headline": lambda root: real_headline(root, OTHERS_POSES),
@@ -282,14 +283,6 @@ def part_of(name: str, profile: str) -> str:
     if name not in PARTS:
         raise InputError(f"<!-- {name} {profile} -->: no such part; known: {', '.join(PARTS)}")
     return PARTS[name](PUBLISHED / (headline() if profile == "headline" else profile))
-
-
-def _localizer_table(cells: pd.DataFrame, heading: str, labels: pd.Series) -> str:
-    """Format a row per label in their order, a column per localizer."""
-    texts = [_cell(cell) for cell in rows_of(cells)]
-    table = cells.assign(row=labels, text=texts).pivot(index="row", columns="model", values="text")
-    table = table.loc[labels.unique(), list(MODELS)].rename(columns=TITLES)
-    return markdown_table(table.rename_axis(index=heading).reset_index())
 
 
 def _change(factor: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -52,10 +52,24 @@ def cells_beside_print(root: Path, name: str) -> str:
     """
     cells = read_table(root, name)
     rows = [_row_title(name, cell) for cell in rows_of(cells)]
-    texts = [_beside_print(cell) for cell in rows_of(cells)]
+    return by_localizer(cells, HEADINGS[name], rows, _beside_print)
+
+
+def by_localizer(
+    cells: pd.DataFrame, heading: str, rows: Sequence[str], text: Callable[[Any], str]
+) -> str:
+    """Format cells as a row per title, in the order of the titles, and a column per localizer.
+
+    Args:
+        cells: Cells of a table.
+        heading: Heading of the titles.
+        rows: Title of the row that each cell is in.
+        text: Formats a cell.
+    """
+    texts = [text(cell) for cell in rows_of(cells)]
     table = cells.assign(row=rows, text=texts).pivot(index="row", columns="model", values="text")
     ordered = table.loc[[*dict.fromkeys(rows)], list(MODELS)].rename(columns=TITLES)
-    return markdown_table(ordered.rename_axis(index=HEADINGS[name]).reset_index())
+    return markdown_table(ordered.rename_axis(index=heading).reset_index())
 
 
 def _row_title(name: str, cell: Any) -> str:
@@ -77,16 +91,16 @@ def _beside_print(cell: Any) -> str:
     return f"{ours} *({cell.published_position_m:.2f}, {cell.published_orientation_deg:.2f}{mark})*"
 
 
-def making(name: str, profile: str) -> str:
-    """Say how a table is made alone with a profile, and what that takes.
+def making(root: Path, name: str) -> str:
+    """Say how a table is made alone with the profile of a run, and what that takes.
 
     Args:
+        root: Published results; those of ``mini``, the default, or another profile of ``config``.
         name: Name of the table.
-        profile: Name of the profile, ``config/<profile>.yaml``; ``mini`` is the default.
     """
-    cost = _planned(profile)[name]
+    cost = _planned(root.name)[name]
     return (
-        f"```\nsnakemake --cores {CORES} results/{profile}/tables/{name}.csv\n```\n\n"
+        f"```\nsnakemake --cores {CORES} results/{root.name}/tables/{name}.csv\n```\n\n"
         f"From nothing: {cost['jobs']:.0f} jobs, about {duration(cost['wall_s'])} on {CORES} cores"
         f" ({duration(cost['cpu_s'])} of processor time, predicted from measured runs). What an"
         " earlier run has made is not made again."

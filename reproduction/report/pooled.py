@@ -10,17 +10,17 @@ from typing import NamedTuple
 import pandas as pd
 from scipy.stats import spearmanr
 
+from reproduction.claims.evidence import QUANTITIES
 from reproduction.claims.verdicts import Claim, Verdict, published_claims
 from reproduction.replications.effects import NETWORKS
-from reproduction.replications.pooling import CLAIMS, EFFECTS, POOLED
-from reproduction.replications.tables import read_effects, read_verdicts
-from reproduction.report.findings import change_text, percent
+from reproduction.replications.pooling import POOLED
+from reproduction.replications.tables import read_pooled
+from reproduction.report.findings import change_text, percent, signed
 from reproduction.report.forest import Row, rows_in
 from reproduction.report.intervals import Interval
 from reproduction.tables.layouts import TITLES
 from reproduction.tables.sheet import markdown_table
 
-QUANTITIES = ("position", "orientation")
 # How a line about claims with a verdict begins.
 OUTCOMES = {
     Verdict.HOLDS: "Reproduced",
@@ -111,7 +111,7 @@ def pooled_lines(folder: Path) -> str:
     Raises:
         InputError: A table cannot be read.
     """
-    table, verdicts = read_effects(folder / EFFECTS), read_verdicts(folder / CLAIMS)
+    table, verdicts = read_pooled(folder)
     lines = [_line(line, table, verdicts) for line in LINES]
     return "\n".join(f"- {text}" for text in [*lines[:2], _networks(table), *lines[2:]])
 
@@ -155,18 +155,14 @@ def _networks(table: pd.DataFrame) -> str:
             float(spearmanr(group["printed"], group["value"])[0])
             for _, group in rows.groupby("replication", sort=False)
         ]
-        span = f"{_signed(min(found))} to {_signed(max(found))}"
-        parts.append(f"{_signed(mean(found))} in {quantity} ({span})")
+        span = f"{signed(min(found))} to {signed(max(found))}"
+        parts.append(f"{signed(mean(found))} in {quantity} ({span})")
     order = own[own["quantity"] == "position"].groupby("part")["value"].mean().sort_values()
     best = TITLES[str(order.index[0])]
     return (
         "**Which network is best.** Rank correlation with the paper among the five, mean and range"
         f" over the replications: {', '.join(parts)}. The lowest position error is {best}'s."
     )
-
-
-def _signed(number: float) -> str:
-    return f"{number:+.2f}".replace("-", "−")
 
 
 def pooled_claims(folder: Path) -> str:
@@ -178,7 +174,7 @@ def pooled_claims(folder: Path) -> str:
     Raises:
         InputError: A table cannot be read.
     """
-    table, verdicts = read_effects(folder / EFFECTS), read_verdicts(folder / CLAIMS)
+    table, verdicts = read_pooled(folder)
     parts = [*rows_in(table, "percent"), *rows_in(table, "share")]
     rows = []
     for claim in published_claims():
@@ -196,9 +192,9 @@ def pooled_claims(folder: Path) -> str:
 
 
 def _part_text(row: Row) -> str:
-    value, low, high = row.pooled
     if row.quantity == "batches assisted":
-        return f"{row.label} {100 * value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)"
+        value, low, high = (100 * share for share in row.pooled)
+        return f"{row.label} {value:.0f} % ({low:.0f} to {high:.0f} %)"
     return f"{row.label} {percent(Interval(*(1 + end / 100 for end in row.pooled)))}"
 
 

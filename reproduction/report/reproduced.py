@@ -7,6 +7,7 @@ from pathlib import Path
 from statistics import mean
 from typing import Literal, NamedTuple
 
+from reproduction.claims.evidence import QUANTITIES
 from reproduction.report.findings import (
     CONTROLS,
     LABELS,
@@ -15,6 +16,7 @@ from reproduction.report.findings import (
     percent,
     read_table,
     sfm_training_labels,
+    signed,
 )
 from reproduction.report.intervals import Interval
 from reproduction.report.paper_cells import SIZES, paper_cells, rank_correlations
@@ -25,7 +27,6 @@ CHANGES = re.compile(r"p ([+-]?\d+) %, o ([+-]?\d+) %")
 # Lines are told by published runs with fresh seeds whose test frames are whole paths: by this one,
 # and by those of the findings on sizes and on labels.
 MORE_SANCTUARY = "more_sanctuary"
-QUANTITIES = ("position", "orientation")
 # Claims whose changes, like the paper's, are shares of the error with noise, so that none is over
 # 100 %. Here they are told over the error without.
 SHARES_OF_THE_LARGER = ("C6",)
@@ -123,8 +124,8 @@ def _networks(root: Path) -> str:
     against = sum(order < 0 for order in position)
     return (
         "**Not reproduced: which network is best.** Rank correlation with the paper among the five,"
-        f" mean over the {len(position)} rows of Table 4: {_signed(mean(position))} in position"
-        f" (negative in {against} rows), {_signed(mean(orientation))} in orientation."
+        f" mean over the {len(position)} rows of Table 4: {signed(mean(position))} in position"
+        f" (negative in {against} rows), {signed(mean(orientation))} in orientation."
         " Our networks are small and shown little."
     )
 
@@ -187,7 +188,3 @@ def _claim(run: Path, claim: str) -> dict[str, str]:
     if claim not in rows:
         raise InputError(run, f"does not judge {claim}", "publish again")
     return rows[claim]
-
-
-def _signed(number: float) -> str:
-    return f"{number:+.2f}".replace("-", "−")

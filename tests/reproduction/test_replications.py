@@ -36,7 +36,7 @@ from reproduction.replications.effects import (
     printed_effects,
 )
 from reproduction.replications.pooling import CLAIMS, EFFECTS, POOLED, write_pooled
-from reproduction.replications.tables import read_effects
+from reproduction.replications.tables import read_pooled
 from reproduction.report.claims_table import claims_table
 from reproduction.report.forest import PICTURE, main, rows_in
 from reproduction.report.pooled import pooled_claims, pooled_lines
@@ -123,9 +123,7 @@ def test_the_forest_plot_shows_the_factors_and_the_nearest_rival(pooled):
     assert main([str(pooled)]) == 0
     with Image.open(pooled / PICTURE) as picture:
         assert min(picture.size) > 500
-    rows = {
-        (row.claim, row.label): row for row in rows_in(read_effects(pooled / EFFECTS), "percent")
-    }
+    rows = {(row.claim, row.label): row for row in rows_in(read_pooled(pooled).effects, "percent")}
     row = rows["C7", "80k, not 6k, position"]
     assert row.pooled[0] == pytest.approx(-50, abs=0.1)
     assert len(row.single) == 3
