@@ -54,7 +54,7 @@ DETAIL: Literal["full"] = "full"
 USUAL_FRAMES = 300  # frames of a capture
 # The network of the default size is off by 5 to 10 per cent of the extent of the cameras: 12 cm in
 # a kitchen of 3 m, 3 m in a corridor of 30 m, where the map is off by 3 cm.
-LEARNABLE_M, EXPECTED_SHARE = 8.0, 0.08
+LEARNABLE_M, ERROR_SHARE = 8.0, 0.08
 
 
 @dataclass(frozen=True)
@@ -305,7 +305,7 @@ def tell_of_network(extent_m: float, say: Callable[[str], None]) -> None:
     """Say before the time is spent how much a network will learn of a place of this size."""
     expected = (
         f"the cameras span {extent_m:.1f} m: a network trained on rendered frames will be off by"
-        f" about {EXPECTED_SHARE * extent_m:.1f} m, which is 5 to 10 % of that; the map localizes"
+        f" about {ERROR_SHARE * extent_m:.1f} m, which is 5 to 10 % of that; the map localizes"
         " without it"
     )
     if extent_m > LEARNABLE_M:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +16,8 @@ from PIL import Image
 from baselines.places.check import CLOSE_M
 from baselines.places.place import Place
 from synfeal.dataset.images import read_image
+from synfeal.evaluation.coverage import WIDE_LEVEL
+from synfeal.evaluation.metrics import POSITION
 from synfeal.geometry.poses import inverse
 from synfeal.records.files import atomic_path, read_json
 
@@ -87,6 +90,10 @@ def write_report(place: Place, record: dict[str, Any]) -> None:
         plan=plan_of(record["check"]["places"], world_from_check),
         plan_px=PLAN_PX,
         lines=coverage_lines(record),
+        # How much of the position's error the 95 % radius holds, and how wide it is.
+        of_frames=_at_95(record["trial"]["stated"]),
+        of_halves=_at_95(record["check"].get("halves", {})),
+        of_pictures=_at_95(record["check"]["stated"]),
         stated_px=STATED_PX,
         ends_px=(_along_px(LEAST_SHARE), _along_px(1.0)),
         ticks=[(share, _along_px(share)) for share in TICKS],
@@ -95,6 +102,12 @@ def write_report(place: Place, record: dict[str, Any]) -> None:
     )
     with atomic_path(place.report) as temporary:
         temporary.write_text(page, encoding="utf-8")
+
+
+def _at_95(stated: Mapping[str, list[dict[str, float]]]) -> dict[str, float] | None:
+    """Select what the position's radius of 95 % came to; None where nothing is known of it."""
+    levels = stated.get(POSITION, [])
+    return next((level for level in levels if level["level"] == WIDE_LEVEL), None)
 
 
 def coverage_lines(record: dict[str, Any]) -> tuple[CoverageLine, ...]:

@@ -21,6 +21,7 @@ which hold the share of new poses with 90 % confidence and not only on average.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, NamedTuple, Self
 
@@ -218,26 +219,16 @@ def _sure_factors(errors: tuple[float, ...], spreads: tuple[float, ...]) -> Arra
     return np.maximum(limits, _factors(errors, spreads))
 
 
-def held_out_coverage(tried: Poses) -> dict[str, list[Coverage]]:
-    """Judge errors that half of some poses state by the factors of the other half.
+def held_out_coverage(trial: Trial) -> dict[str, list[Coverage]]:
+    """Judge errors that half of a map's frames state by the factors of the other half.
 
     Returns:
         Coverage of ``position_m`` and of ``orientation_deg``; nothing where a half has too few.
     """
-    if len(tried.position_m) < 2 * FEWEST:
-        return {}
-    columns = {
-        POSITION: (tried.position_m, tried.position_spread_m),
-        ORIENTATION: (tried.orientation_deg, tried.orientation_spread_deg),
-    }
-    found = {}
-    for name, (errors, spreads) in columns.items():
-        factors = np.empty((len(errors), 2))
-        for half in (0, 1):
-            factors[half::2] = _factors(errors[1 - half :: 2], spreads[1 - half :: 2])
-        stated = np.array(spreads)[:, None] * factors
-        found[name] = coverage(np.array(errors), *stated.T)
-    return found
+    alone = trial.model_copy(update={"photographs": None})
+    return _coverage_by_halves(
+        trial, lambda others: ErrorScale(alone.model_copy(update=dict(others)))
+    )
 
 
 def photographs_coverage(trial: Trial) -> dict[str, list[Coverage]]:
@@ -246,17 +237,28 @@ def photographs_coverage(trial: Trial) -> dict[str, list[Coverage]]:
     Returns:
         Coverage of ``position_m`` and of ``orientation_deg``; nothing where a half has too few.
     """
-    seen = trial.photographs
-    if seen is None or len(seen.position_m) < 2 * FEWEST:
+    if trial.photographs is None:
         return {}
-    stated = np.empty((len(seen.position_m), 4))
+    return _coverage_by_halves(
+        trial.photographs,
+        lambda others: ErrorScale(trial.model_copy(update={"photographs": others})),
+    )
+
+
+def _coverage_by_halves(
+    poses: Poses, scale_of: Callable[[Poses], ErrorScale]
+) -> dict[str, list[Coverage]]:
+    """Judge the radii of every second pose by the scale that the others make."""
+    if len(poses.position_m) < 2 * FEWEST:
+        return {}
+    stated = np.empty((len(poses.position_m), 4))
     for half in (0, 1):
-        others = Poses(**{name: one[1 - half :: 2] for name, one in seen})
-        scale = ErrorScale(trial.model_copy(update={"photographs": others}))
-        stated[half::2] = [scale.stated(spread) for spread in _spreads(seen)[half::2]]
+        others = Poses(**{name: getattr(poses, name)[1 - half :: 2] for name in Poses.model_fields})
+        scale = scale_of(others)
+        stated[half::2] = [scale.stated(spread) for spread in _spreads(poses)[half::2]]
     return {
-        POSITION: coverage(np.array(seen.position_m), *stated.T[:2]),
-        ORIENTATION: coverage(np.array(seen.orientation_deg), *stated.T[2:]),
+        POSITION: coverage(np.array(poses.position_m), *stated.T[:2]),
+        ORIENTATION: coverage(np.array(poses.orientation_deg), *stated.T[2:]),
     }
 
 

@@ -237,6 +237,7 @@ def test_the_report_of_a_mesh_speaks_of_renderings(meshed):
     assert (check["kind"], check["pictures"]) == ("renderings", 15)
     page = (meshed / "report.html").read_text()
     assert "of 15 renderings of the mesh" in page
+    assert "cm, median of the frames that were left out of the map." in page
     assert "The scan beside photographs" not in page
     assert '<span class="whole">--out poses.csv</span>' in page
 
