@@ -63,9 +63,10 @@ from baselines.references.local_features import (
     Sift,
 )
 from baselines.references.map_frames import FrameChoice, MapFrames, read_map_frames
-from baselines.references.mapped import StructureMap, read_frames
+from baselines.references.mapped import StructureMap, map_of, read_frames
 from baselines.references.photographs import Finder, Photograph
 from baselines.training.localize import open_picture
+from benchmarks.stated_errors import CLOSE_DEG, CLOSE_M, WRONG_M
 from reproduction.statistics.limits import share_limits, sign_test
 from synfeal.camera.photograph import PhotographCamera
 from synfeal.config.dataset import CameraConfig
@@ -78,9 +79,6 @@ from synfeal.scanning.camera import CameraOptions
 
 Array = NDArray[np.float64]
 
-CLOSE_M, CLOSE_DEG = 0.05, 5.0
-# A pose that is farther off is of another place that looks alike.
-WRONG_M = 0.5
 # Photographs of one stretch of the way share their fate; so many form a block.
 BLOCK = 10
 LARGER = 2
@@ -376,17 +374,7 @@ def _finders(
         if vlad is None:
             vlad = Vlad.learn(views, SEED)
             vectors = vlad.describe(views)
-        place = StructureMap(
-            names=frames.names,
-            world_from_cam=frames.world_from_cam,
-            camera=frames.camera,
-            features=features,
-            vectors=vectors,
-            vlad=vlad,
-            sequence_from_world=frames.sequence_from_world,
-            mesh_file=frames.mesh_file,
-            record={},
-        )
+        place = map_of(frames, features, vectors, vlad)
         finders[kind] = FewerFrames(place, features_of, retrieved)
     return finders, map_s
 

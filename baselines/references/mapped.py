@@ -15,7 +15,7 @@ trained but the vocabulary of DenseVLAD. A map is a folder of plain files::
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -174,7 +174,22 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         "repeats_seconds": round(time.perf_counter() - began - mapped_s, 1),
         "provenance": provenance(seed, "none"),
     }
-    made = StructureMap(
+    made = replace(map_of(frames, features, vectors, vlad), record=record, repeats=repeats)
+    with writing_to(out, lambda: "choose another folder with `out`"):
+        write_map(made, out)
+    return made
+
+
+def map_of(frames: MapFrames, features: Features, vectors: Vectors, vlad: Vlad) -> StructureMap:
+    """Put a map together from what was found in its frames; look-alikes are not searched.
+
+    Args:
+        frames: The frames.
+        features: Their local features.
+        vectors: Their vectors (N, D) for retrieval.
+        vlad: What these were computed by.
+    """
+    return StructureMap(
         names=frames.names,
         world_from_cam=frames.world_from_cam,
         camera=frames.camera,
@@ -183,12 +198,8 @@ def build_map(frames: MapFrames, out: Path, seed: int = 0) -> StructureMap:
         vlad=vlad,
         sequence_from_world=frames.sequence_from_world,
         mesh_file=frames.mesh_file,
-        record=record,
-        repeats=repeats,
+        record={},
     )
-    with writing_to(out, lambda: "choose another folder with `out`"):
-        write_map(made, out)
-    return made
 
 
 def _refuse_few(features: Features, frames: MapFrames) -> None:
