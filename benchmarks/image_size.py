@@ -24,6 +24,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from PIL import Image
 from tqdm import tqdm
 
 from baselines.config.references import ReferencesConfig
@@ -31,11 +32,13 @@ from baselines.references.arrays import most_alike
 from baselines.references.correspondences import match_test_frames
 from baselines.references.descriptors import Vlad
 from baselines.references.features import features_of
-from baselines.references.structure import absolute_pose, lifted, pinhole
+from baselines.references.mapped import VIEW_PX
+from baselines.references.structure import lifted, localize
 from reproduction.figures.style import BLUE, GREEN, VERMILION
 from reproduction.report.stamped import digest, stamped_png, write_stamped
 from reproduction.tables.layouts import TITLES
 from synfeal.config.dataset import CameraConfig
+from synfeal.dataset.packed import fit_frame
 from synfeal.dataset.pose_table import PoseTable, read_pose_table
 from synfeal.errors import exit_status
 from synfeal.evaluation.bootstrap import limits, medians, path_counts
@@ -48,7 +51,6 @@ from synfeal.render.choose import open_renderer
 WIDTHS_PX = (64, 88, 160, 320)
 MAP_EVERY, TEST_EVERY = 4, 8
 BOUND = 1 / 80  # largest reprojection error of an inlier, of the width
-THUMBNAIL_PX = 64  # of the views that map frames are retrieved by
 TABLE, PICTURE, NETWORKS = "image_size.csv", "image_size.png", "gpu_errors.csv"
 CENTIMETRES = 100.0
 
@@ -95,7 +97,7 @@ def measure(folder: Path, out_csv: Path) -> None:
     """
     mesh = load_mesh(folder / "scene" / "mesh.glb")
     poses = {
-        split: every(read_pose_table(folder / "labels" / f"{split}.csv"), step)
+        split: read_pose_table(folder / "labels" / f"{split}.csv").at(slice(None, None, step))
         for split, step in (("train", MAP_EVERY), ("test", TEST_EVERY))
     }
     rows = []
@@ -114,17 +116,6 @@ def measure(folder: Path, out_csv: Path) -> None:
         write_frame(out_csv, pd.DataFrame(rows), "%.5g")
 
 
-def every(table: PoseTable, step: int) -> PoseTable:
-    """Keep every n-th frame."""
-    rows = slice(None, None, step)
-    return PoseTable(
-        np.arange(len(table.frame[rows])),
-        table.path[rows],
-        table.position_m[rows],
-        table.quat_wxyz[rows],
-    )
-
-
 def locate(known: Frames, asked: Frames, camera: CameraConfig) -> Row:
     """Locate frames in a map of others, as the reference method with depth does.
 
@@ -138,30 +129,20 @@ def locate(known: Frames, asked: Frames, camera: CameraConfig) -> Row:
         features_of(map(_grey, frames.rgb), depth, camera, references)
         for frames, depth in ((known, iter(known.depth_m)), (asked, None))
     )
-    views, queries = (np.stack([*map(_thumbnail, frames.rgb)]) for frames in (known, asked))
+    views, queries = (np.stack([*map(_view, frames.rgb)]) for frames in (known, asked))
     vlad = Vlad.learn(views, seed=0)
     retrieved = most_alike(vlad.describe(views), vlad.describe(queries), references.retrieved)
     matches = match_test_frames(train, test, retrieved)
-    point_m = lifted(matches, known.poses)
-    pinhole_camera = pinhole(camera)
-    usable = np.asarray(np.isfinite(point_m).all(axis=1))
-    pixel = matches.slope * pinhole_camera.params[:2]
-    poses = []
-    for query in range(len(matches)):
-        own = np.arange(len(usable))[matches.of(query)]
-        own = own[usable[own]]
-        bound_px = BOUND * camera.width
-        poses.append(absolute_pose(pixel[own], point_m[own], pinhole_camera, 0, bound_px))
-    return _row(np.array(poses), asked.poses, camera.width, len(known.poses))
+    found = localize(matches, lifted(matches, known.poses), camera, 0, BOUND * camera.width)
+    return _row(found, asked.poses, camera.width, len(known.poses))
 
 
 def _grey(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
 
 
-def _thumbnail(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    size = (THUMBNAIL_PX, THUMBNAIL_PX)
-    return np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+def _view(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return fit_frame(Image.fromarray(rgb), VIEW_PX, "whole")
 
 
 def _row(found: NDArray[np.float64], truth: PoseTable, width_px: int, map_frames: int) -> Row:
@@ -170,12 +151,12 @@ def _row(found: NDArray[np.float64], truth: PoseTable, width_px: int, map_frames
     lost = np.asarray(~np.isfinite(found).all(axis=(1, 2)))
     position_m, angle_rad = pose_error(np.where(lost[:, None, None], true, found), true)
     _, path = np.unique(truth.path, return_inverse=True)
-    counts = path_counts(int(path.max()) + 1, generator_of("image size"))
+    n_paths = int(path.max()) + 1
+    counts = path_counts(n_paths, generator_of("image size"))
     numbers: list[float] = []
     for errors in (position_m, np.degrees(angle_rad)):
         sample = medians(np.where(lost, np.inf, errors), path, counts)
         numbers += [float(sample[0]), *limits(sample)]
-    n_paths = int(path.max()) + 1
     return Row(width_px, map_frames, len(truth), n_paths, int((~lost).sum()), *numbers)
 
 

@@ -57,7 +57,13 @@ def lifted(matches: Correspondences, train: PoseTable) -> Array:
     return np.where(unusable[:, None], np.nan, turned + world_from_cam[:, :3, 3])
 
 
-def localize(matches: Correspondences, point_m: Array, seen_by: CameraConfig, seed: int) -> Array:
+def localize(
+    matches: Correspondences,
+    point_m: Array,
+    seen_by: CameraConfig,
+    seed: int,
+    max_error_px: float = MAX_ERROR_PX,
+) -> Array:
     """Find the poses of test frames from their matches.
 
     Args:
@@ -66,6 +72,7 @@ def localize(matches: Correspondences, point_m: Array, seen_by: CameraConfig, se
             where that is not known.
         seen_by: Camera of the test frames.
         seed: Seed of RANSAC's samples.
+        max_error_px: Largest reprojection error of an inlier, pixels.
 
     Returns:
         Poses ``world_from_cam`` (N, 4, 4); NaN where none is found.
@@ -74,7 +81,9 @@ def localize(matches: Correspondences, point_m: Array, seen_by: CameraConfig, se
     known = np.asarray(np.isfinite(point_m).all(axis=1))
     rows = [np.flatnonzero(known[own]) + own.start for own in map(matches.of, range(len(matches)))]
     pixel = matches.slope * camera.params[:2]
-    return np.array([absolute_pose(pixel[own], point_m[own], camera, seed) for own in rows])
+    return np.array(
+        [absolute_pose(pixel[own], point_m[own], camera, seed, max_error_px) for own in rows]
+    )
 
 
 def absolute_pose(

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from benchmarks.image_size import NETWORKS, PICTURE, TABLE, Frames, draw, every, locate
+from benchmarks.image_size import NETWORKS, PICTURE, TABLE, Frames, draw, locate
 from synfeal.dataset.pose_table import PoseTable
 from synfeal.geometry.poses import quat_wxyz_of
 from tests.support.painted_rooms import FRAME, ROOM, SIZE_M, looking_about, textures
@@ -52,14 +52,6 @@ def test_what_is_not_found_is_the_worst(frames):
     row = locate(known, asked._replace(rgb=np.full_like(asked.rgb, 128)), FRAME)
     assert row.found == 0
     assert row.position_m == np.inf
-
-
-def test_every_nth_frame_keeps_its_pose_and_path():
-    whole = table_of(looking_about(9, seed=3))
-    part = every(whole, 4)
-    np.testing.assert_array_equal(part.position_m, whole.position_m[[0, 4, 8]])
-    np.testing.assert_array_equal(part.path, [0, 2, 4])
-    np.testing.assert_array_equal(part.frame, [0, 1, 2])
 
 
 def test_the_picture_is_drawn_from_both_tables(tmp_path, frames):
