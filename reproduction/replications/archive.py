@@ -3,29 +3,35 @@
 ``errors.parquet`` has a row per trained localizer and archived test frame. Every third frame of a
 test set is archived: neighbours 3 cm apart are nearly the same picture. Effects are computed from
 the archive alone, so that whoever has it can compute them, too.
+
+An archive may be of an unfinished run. Another run, on another machine perhaps, then makes what
+remains (:func:`remaining`), and is archived into the same place.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from reproduction.claims.evidence import COMMON, SCORES, Cell, Evidence, evidence_of
 from reproduction.config.profile import Config
-from reproduction.design.experiments import Design, read_design
+from reproduction.design.experiments import Design, Run, read_design
+from reproduction.design.files import SPLITS, Files
 from reproduction.runs.job_times import read_measured
 from reproduction.runs.results import read_text
 from reproduction.statistics.limits import MEASURES, read_errors
+from synfeal.errors import InputError
 from synfeal.records.files import atomic_directory, write_json
 from synfeal.records.provenance import config_hash, provenance
-from synfeal.records.tables import write_frame
 
 ERRORS = "errors.parquet"
-ASSISTANCE, LABEL_ERROR = "assistance.csv", "label_error.csv"
-SECONDS, PROVENANCE = "seconds.csv", "provenance.json"
+LABEL_TABLES = ASSISTANCE, LABEL_ERROR = "assistance.csv", "label_error.csv"
+SECONDS, PROVENANCE = "seconds.parquet", "provenance.json"
 EVERY = 3  # every third test frame is kept
 KEYS = ("scene", "size", "labels", "init", "model", "test_set")
 # Whole millimetres and hundredths of a degree: both below a thousandth of a median error.
@@ -36,27 +42,59 @@ OWN = "own"
 ON_COMMON = ("table4_size", "table5_from_scratch", "table7_images_shown")
 
 
-def write_archive(root: Path, config: Config, out: Path) -> None:
-    """Archive a finished replication.
+def write_archive(root: Path, config: Config, out: Path) -> int:
+    """Archive what a run has made of a replication; what was archived before, and it lacks, stays.
 
     Args:
         root: Results of the run.
         config: Its profile, with its seed.
         out: Directory to write; what lies there is replaced as a whole.
 
+    Returns:
+        How many of its trained localizers are not archived yet.
+
     Raises:
-        InputError: the run is not finished.
+        InputError: what lies in ``out`` was made with other settings, or the run has made nothing.
     """
     design = read_design(config)
+    settings = config_hash(config)
+    made = provenance(config.seed, settings)
+    earlier = _earlier_parts(out, settings)
+    errors = pd.concat(list(_errors_of(design, root, out)), ignore_index=True)
+    tables = {name: _newest(root / "tables" / name, out / name) for name in LABEL_TABLES}
+    seconds = _seconds(root, out)
     with atomic_directory(out, replace=True) as directory:
-        errors = pd.concat(list(_errors_of(design, root)), ignore_index=True)
         write_errors(errors, directory / ERRORS)
-        for name in (ASSISTANCE, LABEL_ERROR):
-            (directory / name).write_text(read_text(root / "tables" / name), encoding="utf-8")
-        jobs = read_measured(root).groupby("stage", sort=True)
-        seconds = jobs[["wall_s", "cpu_s"]].sum().assign(jobs=jobs.size()).reset_index()
-        write_frame(directory / SECONDS, seconds, "%.1f")
-        write_json(directory / PROVENANCE, provenance(config.seed, config_hash(config)))
+        for name, text in tables.items():
+            if text is not None:
+                (directory / name).write_text(text, encoding="utf-8")
+        seconds.to_parquet(directory / SECONDS, index=False, compression="zstd")
+        write_json(directory / PROVENANCE, made | {"earlier": earlier})
+    return len(_missing(design, out))
+
+
+def remaining(config: Config, archive: Path) -> list[str]:
+    """List the Snakemake targets that a replication still needs.
+
+    Args:
+        config: Its profile, with its seed.
+        archive: Its archive; need not exist.
+
+    Returns:
+        Errors of each localizer that is not archived, with what places their test frames on paths,
+        and the rule of the label tables. Nothing where the archive is whole.
+    """
+    design = read_design(config)
+    runs = sorted({run for _, run in _missing(design, archive)})
+    scenes = {run.scene for run in runs}
+    targets = [f"{config.root}/runs/{run.directory}/errors.csv" for run in runs]
+    for scene, size in Files(config, design).sizes:
+        if scene in scenes:
+            folder = f"{config.root}/labels/{scene}/{size}/synfeal"
+            targets += [f"{folder}/{split}.csv" for split in SPLITS]
+    if not all((archive / name).is_file() for name in LABEL_TABLES):
+        targets.append("labels")
+    return targets
 
 
 def write_errors(errors: pd.DataFrame, path: Path) -> None:
@@ -86,15 +124,79 @@ def read_archived(path: Path) -> pd.DataFrame:
     return table
 
 
-def _errors_of(design: Design, root: Path) -> Iterator[pd.DataFrame]:
-    """Yield the rows of each run, on each test set that it is judged on."""
-    evidence = evidence_of(design, root)
+def _wanted(design: Design) -> list[tuple[str, Run]]:
+    """List the test sets and localizers that are archived, a localizer on each set it is judged on.
+
+    Of repetitions, the first is.
+    """
+    wanted = []
     for test_set, tables in ((OWN, set(design.tables) - {*ON_COMMON}), (COMMON, {*ON_COMMON})):
         runs = {run for table in tables for run in design.table_runs(table)}
-        for run in sorted(runs):
-            cell = Cell(run.model, run.scene, run.size, run.labels, run.init)
-            if run.repetition == 0:
-                yield _rows(cell, test_set, evidence, root / "runs" / run.directory)
+        wanted += [(test_set, run) for run in sorted(runs) if run.repetition == 0]
+    return wanted
+
+
+def _missing(design: Design, archive: Path) -> list[tuple[str, Run]]:
+    archived = _archived(archive)
+    return [(on, run) for on, run in _wanted(design) if (*_cell(run), on) not in archived]
+
+
+def _cell(run: Run) -> Cell:
+    return Cell(run.model, run.scene, run.size, run.labels, run.init)
+
+
+def _archived(archive: Path) -> dict[tuple[str, ...], pd.DataFrame]:
+    """Read an archive's rows by cell and test set; empty where there is no archive."""
+    if not (archive / ERRORS).is_file():
+        return {}
+    errors = read_archived(archive / ERRORS)
+    for key in KEYS:
+        errors[key] = errors[key].astype(str)
+    names = [*Cell._fields, "test_set"]
+    return {tuple(map(str, key)): rows for key, rows in errors.groupby(names, sort=False)}
+
+
+def _errors_of(design: Design, root: Path, archive: Path) -> Iterator[pd.DataFrame]:
+    """Yield the rows of each finished run on each test set, or those that are archived."""
+    evidence = evidence_of(design, root)
+    archived = _archived(archive)
+    found = False
+    for test_set, run in _wanted(design):
+        folder = root / "runs" / run.directory
+        finished = (folder / SCORES["labels"][0]).is_file()
+        if finished:
+            yield _rows(_cell(run), test_set, evidence, folder)
+        elif (*_cell(run), test_set) in archived:
+            yield archived[(*_cell(run), test_set)]
+        else:
+            continue
+        found = True
+    if not found:
+        raise InputError(root, "has no trained localizer", "run its profile first")
+
+
+def _earlier_parts(archive: Path, settings: str) -> list[dict[str, Any]]:
+    """List the provenance of an archive and of what it was added to, oldest first."""
+    path = archive / PROVENANCE
+    if not path.is_file():
+        return []
+    record = json.loads(read_text(path))
+    if record["config_sha256"] != settings:
+        raise InputError(archive, "was made with other settings", "remove it, or archive elsewhere")
+    return [*record.pop("earlier"), record]
+
+
+def _newest(made: Path, archived: Path) -> str | None:
+    return next((read_text(path) for path in (made, archived) if path.is_file()), None)
+
+
+def _seconds(root: Path, archive: Path) -> pd.DataFrame:
+    """Join the jobs of a run to those archived; one that ran in both took what it took last."""
+    jobs = read_measured(root)[["stage", "job", "wall_s", "cpu_s"]]
+    if (archive / SECONDS).is_file():
+        jobs = pd.concat([pd.read_parquet(archive / SECONDS), jobs], ignore_index=True)
+    jobs = jobs.drop_duplicates(["stage", "job"], keep="last").round(1)
+    return jobs.sort_values(["stage", "job"], ignore_index=True)
 
 
 def _rows(cell: Cell, test_set: str, evidence: Evidence, folder: Path) -> pd.DataFrame:

@@ -1,5 +1,6 @@
 """Effects and verdicts of replications whose errors are known by construction."""
 
+import json
 import math
 import re
 import shutil
@@ -13,15 +14,19 @@ from PIL import Image
 from reproduction.claims.evidence import COMMON, Cell
 from reproduction.claims.verdicts import published_claims
 from reproduction.config.load import load_config
+from reproduction.replications.__main__ import main as replications
 from reproduction.replications.archive import (
     ASSISTANCE,
     ERRORS,
     FAILED,
     KEYS,
-    LABEL_ERROR,
+    LABEL_TABLES,
     OWN,
+    PROVENANCE,
+    SECONDS,
     UNITS,
     read_archived,
+    remaining,
     write_archive,
     write_errors,
 )
@@ -270,23 +275,95 @@ def test_a_failed_prediction_is_the_worst_and_one_archive_is_not_pooled(tmp_path
         write_pooled([folder], tmp_path)
 
 
-def test_an_archive_of_the_papers_own_numbers_has_the_printed_effects(tmp_path):
-    """Results whose every frame is as wrong as the printed median, archived and read back."""
-    results = claims_results.papers_results(tmp_path / "results")
-    for name in (ASSISTANCE, LABEL_ERROR):
-        (results.root / "tables").mkdir(exist_ok=True)
-        (results.root / "tables" / name).write_text("method,split\n")
-    write_frame(
-        results.root / "benchmarks.csv",
-        pd.DataFrame(
-            [("train", "a", 2.0, 1.5, 90.0)], columns=["stage", "job", "wall_s", "cpu_s", "peak_mb"]
-        ),
-    )
-    night = load_config(Path("config/config.yaml"), Path("config/night.yaml"))
-    write_archive(results.root, night, tmp_path / "101")
+@pytest.fixture(scope="module")
+def papers(tmp_path_factory):
+    """Results whose every frame is as wrong as the printed median, and their profile."""
+    results = claims_results.papers_results(tmp_path_factory.mktemp("papers") / "results")
+    write_label_tables(results.root)
+    write_jobs(results.root, [("train", "a", 2.0, 1.5)])
+    return results, load_config(Path("config/config.yaml"), Path("config/night.yaml"))
+
+
+def write_label_tables(root):
+    (root / "tables").mkdir(exist_ok=True)
+    for name in LABEL_TABLES:
+        (root / "tables" / name).write_text("method,split\n")
+
+
+def write_jobs(root, jobs):
+    table = pd.DataFrame(jobs, columns=["stage", "job", "wall_s", "cpu_s"]).assign(peak_mb=90.0)
+    write_frame(root / "benchmarks.csv", table)
+
+
+def test_an_archive_of_the_papers_own_numbers_has_the_printed_effects(papers, tmp_path):
+    """Archived and read back."""
+    results, night = papers
+    assert write_archive(results.root, night, tmp_path / "101") == 0
+    assert not remaining(night, tmp_path / "101")
     found = {
         effect[:4]: float(effect.sample[0]) for effect in effects_of(Archive(tmp_path / "101"))
     }
     for key, printed in printed_effects().items():
         if key[0] != "C13":  # of images shown, which the paper does not print
             assert found[key] == pytest.approx(printed, abs=0.01), key
+
+
+def test_a_replication_in_two_parts_is_that_in_one(papers, tmp_path):
+    """The second machine has the archive of the first, and makes what is not in it."""
+    results, night = papers
+    write_archive(results.root, night, tmp_path / "whole")
+    second = tmp_path / "second"
+    shutil.copytree(results.root, second)
+    first = tmp_path / "first"
+    shutil.copytree(results.root, first)
+    shutil.rmtree(first / "tables")
+    late = "sanctuary/"
+    for folder in sorted(path.parent for path in first.rglob("common_errors.csv")):
+        name = folder.relative_to(first / "runs").as_posix()
+        shutil.rmtree(folder if name.startswith(late) else second / "runs" / name)
+    write_jobs(first, [("train", "a", 2.0, 1.5), ("train", "b", 9.0, 9.0)])
+    write_jobs(second, [("train", "b", 3.0, 2.5), ("train", "c", 1.0, 1.0)])
+
+    archive = tmp_path / "102"
+    missing = write_archive(first, night, archive)
+    targets = remaining(night, archive)
+    runs = [target for target in targets if target.endswith("/errors.csv")]
+    assert all(f"/runs/{late}" in run for run in runs)
+    assert len(runs) == len({*runs}) <= missing
+    assert "labels" in targets
+    # What says which path a test frame is of lies beside them, of every size of their scene alone.
+    beside = [target for target in targets if target.endswith(("train.csv", "test.csv"))]
+    assert beside
+    assert all(f"/labels/{late}" in file for file in beside)
+
+    assert write_archive(second, night, archive) == 0
+    assert not remaining(night, archive)
+    whole, parts = (read_archived(tmp_path / name / ERRORS) for name in ("whole", "102"))
+    order = [*KEYS, "frame"]
+    pd.testing.assert_frame_equal(
+        *(t.sort_values(order, ignore_index=True) for t in (whole, parts)), check_categorical=False
+    )
+    seconds = pd.read_parquet(archive / SECONDS).set_index("job")
+    assert dict(seconds["wall_s"]) == {"a": 2.0, "b": 3.0, "c": 1.0}
+    record = json.loads((archive / PROVENANCE).read_text())
+    assert len(record["earlier"]) == 1
+
+    other = night.model_copy(update={"seed": 7})
+    with pytest.raises(InputError, match="other settings"):
+        write_archive(second, other, archive)
+    with pytest.raises(InputError, match="no trained localizer"):
+        write_archive(tmp_path / "nothing", night, tmp_path / "103")
+
+
+def test_an_unfinished_archive_is_not_pooled(tmp_path, capsys):
+    for seed in (101, 102):
+        write_replication(tmp_path / str(seed), seed)
+    archives = ["--archives", str(tmp_path)]
+    assert replications(["pool", *archives]) == 1
+    assert "finish that replication first" in capsys.readouterr().err
+    assert not (tmp_path / CLAIMS).exists()
+    assert replications(["remaining", "results/of_it", "--seed", "103", *archives]) == 0
+    targets = capsys.readouterr().out.split()
+    # Five networks in 19 cells: 8 label sets, 4 further sizes, 3 from scratch, 4 of fewer images.
+    assert sum(target.endswith("/errors.csv") for target in targets) == 95
+    assert {target.split("/")[1] for target in targets if "/" in target} == {"of_it"}
