@@ -51,7 +51,7 @@ archive: $(INSTALLED)  ## PROFILE's report, figures, and all that its tables are
 	tar --create --gzip --file build/results-$(PROFILE).tar.gz --directory results \
 	  --owner 0 --group 0 --sort name --ignore-failed-read --exclude '.*' \
 	  $(addprefix --exclude=,*.glb *.ply *.pt *.npz *.g2o errors.csv common_errors.csv) \
-	  $(addprefix $(PROFILE)/,report.html summary.md claims.csv provenance.json benchmarks.csv) \
+	  $(addprefix $(PROFILE)/,report.html summary.md claims.csv claim_effects.csv provenance.json benchmarks.csv) \
 	  $(addprefix $(PROFILE)/,benchmarks tables figures labels estimates runs references scenes)
 	@echo build/results-$(PROFILE).tar.gz
 

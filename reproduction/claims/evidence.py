@@ -22,7 +22,6 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.labels.constant import constant_pose
-from reproduction.claims.verdicts import Missing
 from reproduction.design.experiments import Design, Run, common_every
 from reproduction.statistics.limits import COLUMNS, COMMON_COLUMNS, MEASURES, REMEDY, read_errors
 from reproduction.statistics.seeds import Borrowed, Group, Layout, borrowed_deviations, limits
@@ -46,6 +45,10 @@ SCORES = {
 }
 # Measures of the tables whose deviations over seeds a single run borrows.
 BORROWS = {"labels": MEASURES[:2], "true": MEASURES[2:], COMMON: MEASURES[2:]}
+
+
+class Missing(Exception):  # noqa: N818 - not an error: it ends in the verdict `not testable here`
+    """The profile does not make what a claim needs; the message says what."""
 
 
 class Cell(NamedTuple):
@@ -76,23 +79,24 @@ class Evidence:
     # Scene, size and labels of its re-estimated label sets.
     estimated: Sequence[tuple[str, str, str]] = ()
     score: str = "labels"  # of ``SCORES``
-    used: dict[str, None] = field(default_factory=dict)  # files read so far, relative to ``root``
     # By test set, how many paths it has.
     test_paths: dict[tuple[str, str, bool], int] = field(default_factory=dict)
-    seeds: dict[int, None] = field(default_factory=dict)  # repetitions of the cells read so far
     _errors: dict[tuple[Cell, str], Array] = field(default_factory=dict)
     _tests: dict[tuple[str, str, bool], TestSet] = field(default_factory=dict)
 
     def under(self, score: str) -> Evidence:
         """Return the same results under a score, with nothing read yet."""
-        return replace(self, score=score, used={}, test_paths={}, seeds={})
+        return replace(self, score=score, test_paths={})
 
     def file(self, relative: str) -> Path:
-        """Return a result file that the design makes, and note it as used."""
+        """Return a result file that the design makes.
+
+        Raises:
+            InputError: It is not there.
+        """
         path = self.root / relative
         if not path.is_file():
             raise InputError(f"{path}: missing; make the results again")
-        self.used[relative] = None
         return path
 
     def need(self, **keys: str) -> None:
@@ -127,7 +131,6 @@ class Evidence:
                 for of_seeds, deviation in zip(zip(*seeds, strict=True), deviations, strict=True)
             ]
             self._errors[key] = np.array(samples)
-        self.seeds[len(runs)] = None
         return self._errors[key]
 
     def _borrowed(self, model: str) -> dict[str, Borrowed]:

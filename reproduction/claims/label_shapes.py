@@ -16,13 +16,12 @@ import pandas as pd
 
 from baselines.config.learning import MODELS
 from reproduction.claims.evidence import COMMON, QUANTITIES, Cell, Evidence, evidence_of
-from reproduction.claims.labels import changes
 from reproduction.design.experiments import Design, Experiment
 from reproduction.design.shapes import SHAPES, shape_rows
 from reproduction.statistics.seeds import limits
 from reproduction.tables.columns import Column, SideLayout
 from reproduction.tables.side import SideTable, Source, Table
-from synfeal.evaluation.bootstrap import Array, difference, mean_of
+from synfeal.evaluation.bootstrap import Array, difference, mean_of, relative_change
 from synfeal.records.tables import LIMITLESS_MAYBE, TEXT, frame_of
 
 NAME = "shape_changes"
@@ -71,7 +70,7 @@ def change_of(evidence: Evidence, wrong: Experiment, exact: Experiment) -> Array
         [Cell(model, row.scene, row.size, row.label_id) for model in MODELS]
         for row in (wrong, exact)
     )
-    return mean_of(list(changes(evidence, new, old)))
+    return mean_of(list(relative_change(evidence.errors(*new), evidence.errors(*old))))
 
 
 def _records(evidence: Evidence, name: str, change: Array) -> list[dict[str, Any]]:

@@ -12,12 +12,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from reproduction.claims.effects import OWN, Against
 from reproduction.claims.evidence import COMMON, SCORES, Cell, Evidence, evidence_of
 from reproduction.config.profile import Config
 from reproduction.design.experiments import Design, Run, read_design
@@ -26,18 +29,19 @@ from reproduction.runs.job_times import read_measured
 from reproduction.runs.results import read_text
 from reproduction.statistics.limits import MEASURES, read_errors
 from synfeal.errors import InputError
+from synfeal.evaluation.bootstrap import Array, medians, path_counts
 from synfeal.records.files import atomic_directory, write_json
-from synfeal.records.provenance import config_hash, provenance
+from synfeal.records.provenance import config_hash, generator_of, provenance
 
 ERRORS = "errors.parquet"
 LABEL_TABLES = ASSISTANCE, LABEL_ERROR = "assistance.csv", "label_error.csv"
 SECONDS, PROVENANCE = "seconds.parquet", "provenance.json"
 EVERY = 3  # every third test frame is kept
+RESAMPLES = 1000  # resamples of the test paths: enough for a standard error
 KEYS = ("scene", "size", "labels", "init", "model", "test_set")
 # Whole millimetres and hundredths of a degree: both below a thousandth of a median error.
 UNITS = {"position_mm": 1000.0, "orientation_cdeg": 100.0}
 FAILED = np.iinfo(np.uint16).max  # the prediction was no pose, or off by even more
-OWN = "own"
 # What is judged on a scene's common test set; all else on the set whose labels the method made.
 ON_COMMON = ("table4_size", "table5_from_scratch", "table7_images_shown")
 
@@ -122,6 +126,37 @@ def read_archived(path: Path) -> pd.DataFrame:
     for unit in UNITS:
         table[f"true_{unit}"] = table[f"true_{unit}"].fillna(table[unit]).astype(np.uint16)
     return table
+
+
+@dataclass(frozen=True)
+class Archive:
+    """One archived replication: a source of effects."""
+
+    folder: Path
+
+    @cached_property
+    def _groups(self) -> dict[tuple[str, ...], pd.DataFrame]:
+        return _archived(self.folder)
+
+    def log_errors(self, cell: Cell, test_set: str, against: Against) -> Array:
+        """Sample over the test paths; cells on the same test set share the draws."""
+        rows = self._groups[(*cell, test_set)]
+        _, place = np.unique(rows["path"], return_inverse=True)
+        draw = generator_of("replication", cell.scene, test_set, cell.size * (test_set == OWN))
+        counts = path_counts(int(place.max()) + 1, draw, RESAMPLES)
+        names = [f"true_{unit}" if against == "true" else unit for unit in UNITS]
+        values = [rows[name].to_numpy(dtype=float) for name in names]
+        failed = [np.where(v == FAILED, np.inf, v) for v in values]
+        found = np.array([medians(v, place, counts) for v in failed])
+        with np.errstate(divide="ignore"):
+            logs: Array = np.log(found)
+        return logs
+
+    @cached_property
+    def assistance(self) -> pd.DataFrame:
+        """Batches of each label method, and how many of them needed assistance."""
+        table = pd.read_csv(self.folder / ASSISTANCE)
+        return table[table["split"] == "total"].set_index("method")
 
 
 def _wanted(design: Design) -> list[tuple[str, Run]]:

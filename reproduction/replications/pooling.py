@@ -5,57 +5,62 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
-from reproduction.claims.verdicts import Verdict
-from reproduction.replications.effects import (
+from reproduction.claims.effects import (
     NETWORKS,
     RIVALS,
     Against,
-    Archive,
     Effect,
     effects_of,
     printed_effects,
 )
-from reproduction.replications.judge import (
-    Part,
-    Shares,
+from reproduction.claims.judge import (
+    Condition,
+    Limits,
     judge,
     judge_best,
     judge_few,
     judge_many,
-    odds_of,
     percent,
-    pooled_odds,
-    share,
 )
-from reproduction.statistics.pooled import pool
+from reproduction.claims.run import KINECT_FUSION
+from reproduction.claims.tables import BEST, PERCENT, POOLED, SHARE, Keys, Row, write_claims
+from reproduction.claims.verdicts import Verdict
+from reproduction.replications.archive import Archive
+from reproduction.statistics.pooled import Pooled, pool
+from reproduction.tables.assistance import PUBLISHED_ASSISTED, PUBLISHED_BATCHES
 from synfeal.errors import InputError
 from synfeal.evaluation.bootstrap import limits
-from synfeal.records.tables import write_frame
 
-EFFECTS, CLAIMS = "claim_effects.csv", "claims.csv"
-COLUMNS = (
-    "claim",
-    "part",
-    "quantity",
-    "against",
-    "replication",
-    "value",
-    "low",
-    "high",
-    "printed",
-    "standard_error",
-    "unit",
-)
-POOLED = "pooled"
-KINECT_FUSION = "kinect-fusion"
-# Section 4.1 counts assisted batches; its images make 34 batches of a room.
-PRINTED_ASSISTED = {"sfm": 3, "rgbd-toro": 6, "rgbd-g2o": 4}
-PRINTED_BATCHES = 34
-Rows = list[Mapping[str, object]]
+REPLICATIONS = "replications"  # folder of archives and pooled tables, among published runs
+Key = tuple[str, str, str, Against]
+
+
+class Part(NamedTuple):
+    """One effect of a claim in every replication.
+
+    Attributes:
+        values: Logarithms of ratios, one of each replication.
+        variances: Their squared standard errors within the replication.
+    """
+
+    values: tuple[float, ...]
+    variances: tuple[float, ...]
+
+    def limits(self, comparisons: int = 1) -> tuple[float, float]:
+        """Return the pooled limits, at the level corrected for ``comparisons``."""
+        pooled = pool(self.values, self.variances, comparisons)
+        return pooled.low, pooled.high
+
+
+class Shares(NamedTuple):
+    """Logarithms of odds, one of each replication, with their variances."""
+
+    values: tuple[float, ...]
+    variances: tuple[float, ...]
 
 
 def write_pooled(folders: Sequence[Path], out: Path) -> None:
@@ -72,39 +77,34 @@ def write_pooled(folders: Sequence[Path], out: Path) -> None:
     if len(folders) < 2:
         raise InputError(f"{len(folders)} archives of replications", "two are the least to pool")
     archives = {folder.name: Archive(folder) for folder in folders}
-    rows: Rows = []
-    verdicts: dict[tuple[str, str], Verdict] = {}
+    seeds = list(archives)
+    rows: list[Row] = []
+    by_claim: dict[Keys, list[Condition]] = {}
     for key, effects in _by_key(archives).items():
-        part = _part(key, effects)
-        rows += _effect_rows(key, part, dict(zip(archives, effects, strict=True)))
-    for (claim, against), parts in _by_claim(archives).items():
-        if claim != NETWORKS:
-            verdicts[claim, against] = judge_best(parts) if claim == "C12" else judge(parts)
-    counts = {
+        part, printed = _part(effects), printed_effects().get(key, math.nan)
+        rows += _effect_rows(key, part, printed, dict(zip(seeds, effects, strict=True)))
+        condition = Condition(effects[0].asked, effects[0].sign, part.limits, printed)
+        by_claim.setdefault((key[0], key[3]), []).append(condition)
+    verdicts: dict[Keys, Verdict] = {
+        keys: judge_best(conditions) if keys[0] == BEST else judge(conditions)
+        for keys, conditions in by_claim.items()
+        if keys[0] != NETWORKS
+    }
+    shares = {
         method: odds_of(
             [tuple(a.assistance.loc[method, ["assisted", "batches"]]) for a in archives.values()]
         )
         for method in (*RIVALS, KINECT_FUSION)
     }
-    for method, shares in counts.items():
-        rows += _share_rows(method, shares, list(archives))
-    verdicts["C4", ""] = judge_few({method: counts[method] for method in RIVALS})
-    verdicts["C15", ""] = judge_many(counts[KINECT_FUSION])
+    for method, own in shares.items():
+        rows += _share_rows(method, own, seeds)
+    verdicts["C4", ""] = judge_few({method: limits_of(shares[method]) for method in RIVALS})
+    verdicts["C15", ""] = judge_many(limits_of(shares[KINECT_FUSION]))
     out.mkdir(parents=True, exist_ok=True)
-    write_frame(out / EFFECTS, pd.DataFrame(rows, columns=list(COLUMNS)), "%.6g")
-    judged = [
-        {"claim": claim, "against": against, "verdict": verdict, "replications": len(archives)}
-        for (claim, against), verdict in sorted(
-            verdicts.items(), key=lambda item: (int(item[0][0][1:]), item[0][1])
-        )
-    ]
-    write_frame(out / CLAIMS, pd.DataFrame(judged))
+    write_claims(out, rows, verdicts, len(archives))
 
 
-Key = tuple[str, str, str, Against]
-
-
-def _by_key(archives: dict[str, Archive]) -> dict[Key, list[Effect]]:
+def _by_key(archives: Mapping[str, Archive]) -> dict[Key, list[Effect]]:
     """Gather each effect over the replications, in their order."""
     found: dict[Key, list[Effect]] = {}
     for archive in archives.values():
@@ -113,63 +113,85 @@ def _by_key(archives: dict[str, Archive]) -> dict[Key, list[Effect]]:
     return found
 
 
-def _by_claim(archives: dict[str, Archive]) -> dict[tuple[str, str], list[Part]]:
-    """Gather the parts of each claim under each score."""
-    found: dict[tuple[str, str], list[Part]] = {}
-    for key, effects in _by_key(archives).items():
-        found.setdefault((key[0], key[3]), []).append(_part(key, effects))
-    return found
-
-
-def _part(key: Key, effects: Sequence[Effect]) -> Part:
-    first = effects[0]
+def _part(effects: Sequence[Effect]) -> Part:
     return Part(
-        name=f"{key[1]}, {key[2]}",
-        asked=first.asked,
-        sign=first.sign,
         values=tuple(float(effect.sample[0]) for effect in effects),
         variances=tuple(float(np.var(effect.sample[1:], ddof=1)) for effect in effects),
-        printed=printed_effects().get(key, math.nan),
     )
 
 
 def _effect_rows(
-    key: Key, part: Part, by_seed: dict[str, Effect]
-) -> Iterator[Mapping[str, object]]:
-    same = dict(zip(COLUMNS, key, strict=False)) | {"printed": percent(part.printed)}
-    same |= {"unit": "percent"}
+    key: Key, part: Part, printed: float, by_seed: Mapping[str, Effect]
+) -> Iterator[Row]:
+    same: dict[str, object] = dict(zip(("claim", "part", "quantity", "against"), key, strict=True))
+    same |= {"printed": percent(printed), "unit": PERCENT}
     for (seed, effect), variance in zip(by_seed.items(), part.variances, strict=True):
-        value, ends = effect.sample[0], limits(effect.sample)
-        numbers = map(percent, (float(value), *ends))
-        yield same | {
+        numbers = map(percent, (float(effect.sample[0]), *limits(effect.sample)))
+        yield {
+            **same,
             "replication": seed,
             **dict(zip(("value", "low", "high"), numbers, strict=True)),
             "standard_error": math.sqrt(variance),
         }
-    pooled = pool(part.values, part.variances)
+    pooled = pool(*part)
     numbers = map(percent, pooled[:3])
-    yield same | {
+    yield {
+        **same,
         "replication": POOLED,
         **dict(zip(("value", "low", "high"), numbers, strict=True)),
     }
 
 
-def _share_rows(
-    method: str, shares: Shares, seeds: Sequence[str]
-) -> Iterator[Mapping[str, object]]:
-    claim = "C15" if method == KINECT_FUSION else "C4"
-    assisted = PRINTED_ASSISTED.get(method)
-    printed = math.nan if assisted is None else assisted / PRINTED_BATCHES
-    same: dict[str, object] = {"claim": claim, "part": method, "quantity": "batches assisted"}
-    same |= {"against": "", "printed": printed, "unit": "share"}
+def odds_of(counts: Sequence[tuple[int, int]]) -> Shares:
+    """Return the logarithm of the odds of each count, half a case added on either side.
+
+    Args:
+        counts: Assisted batches, and all batches, of each replication.
+    """
+    pairs = [(some + 0.5, total - some + 0.5) for some, total in counts]
+    return Shares(tuple(math.log(a / b) for a, b in pairs), tuple(1 / a + 1 / b for a, b in pairs))
+
+
+def pooled_odds(shares: Shares, comparisons: int = 1) -> Pooled:
+    """Pool logarithms of odds; see :func:`~reproduction.statistics.pooled.pool`."""
+    return pool(shares.values, shares.variances, comparisons, counted=True)
+
+
+def share(pooled: Pooled) -> tuple[float, float, float]:
+    """Return a pooled share with its limits, from its logarithm of odds."""
+    value, low, high = (float(1 / (1 + np.exp(-x))) for x in pooled[:3])
+    return value, low, high
+
+
+def limits_of(shares: Shares) -> Limits:
+    """Return the pooled limits of a share, by the number of shares it is one of."""
+
+    def limits_at(comparisons: int) -> tuple[float, float]:
+        return share(pooled_odds(shares, comparisons))[1:]
+
+    return limits_at
+
+
+def _share_rows(method: str, shares: Shares, seeds: Sequence[str]) -> Iterator[Row]:
+    assisted = PUBLISHED_ASSISTED.get(method)
+    same: dict[str, object] = {
+        "claim": "C15" if method == KINECT_FUSION else "C4",
+        "part": method,
+        "quantity": "batches assisted",
+        "against": "",
+        "printed": math.nan if assisted is None else assisted / PUBLISHED_BATCHES,
+        "unit": SHARE,
+    }
     for seed, value, variance in zip(seeds, *shares, strict=True):
-        yield same | {
+        yield {
+            **same,
             "replication": seed,
             "value": 1 / (1 + math.exp(-value)),
             "standard_error": math.sqrt(variance),
         }
     numbers = share(pooled_odds(shares))
-    yield same | {
+    yield {
+        **same,
         "replication": POOLED,
         **dict(zip(("value", "low", "high"), numbers, strict=True)),
     }

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from reproduction.claims.tables import has_claims, read_claims
 from reproduction.claims.verdicts import published_claims
-from reproduction.replications.tables import REPLICATIONS, has_pooled
+from reproduction.replications.pooling import REPLICATIONS
+from reproduction.report.claim_lines import claims_beside_print
 from reproduction.report.fresh import BESIDE, Judged, claims_to_test, judged_fresh, outcome
-from reproduction.report.pooled import pooled_claims
 from reproduction.report.published_claims import read_published, rows_now
 from reproduction.tables.sheet import markdown_table
 
@@ -29,8 +30,8 @@ def claims_table(root: Path) -> str:
         root: Published results that tell the claims no fresh seed is needed for, among the others.
     """
     replications = root.with_name(REPLICATIONS)
-    if has_pooled(replications):
-        return pooled_claims(replications)
+    if has_claims(replications):
+        return claims_beside_print(read_claims(replications))
     judged = judged_fresh(root.parent)
     drawn = {claim.id for claim in claims_to_test()}
     built = {row["id"]: row for row in rows_now(read_published(root), root)}

@@ -18,13 +18,20 @@ from baselines.labels.methods import SIMULATOR
 from reproduction.claims.label_shapes import NAME as SHAPE_CHANGES
 from reproduction.claims.label_shapes import SCHEMA as SHAPES_SCHEMA
 from reproduction.claims.rules import frozen_rules
+from reproduction.claims.tables import EFFECTS
 from reproduction.claims.verdicts import GROUPS
 from reproduction.design.label_sets import LabelSet
 from reproduction.design.profiles import read_profile
 from reproduction.design.shapes import SHAPES, largest_in_all_shapes
 from reproduction.design.shapes import TABLE as SHAPES_ROWS
 from reproduction.report.fresh import is_fresh
-from reproduction.report.intervals import Interval, cell_interval, mean_change
+from reproduction.report.intervals import (
+    Interval,
+    cell_interval,
+    change_text,
+    mean_change,
+    percent,
+)
 from reproduction.report.publish import PUBLISHED
 from reproduction.report.published_claims import (
     counts_now,
@@ -115,9 +122,16 @@ def can_tell(root: Path) -> bool:
     return all(math.isfinite(number) for interval in limits for number in interval)
 
 
-def findings(root: Path) -> list[Finding]:
-    """List the findings of published results, or of a finished run, most important first."""
-    found = (finding(root) for finding in FINDINGS)
+def findings(
+    root: Path, asked: Sequence[Callable[[Path], Finding | None]] | None = None
+) -> list[Finding]:
+    """List the findings of published results, or of a finished run, most important first.
+
+    Args:
+        root: Results.
+        asked: Those that are looked for; None for all.
+    """
+    found = (finding(root) for finding in (FINDINGS if asked is None else asked))
     return [finding for finding in found if finding is not None]
 
 
@@ -600,6 +614,8 @@ def paired_changes(
         Factors on the position and the orientation error with their limits; None where the claim
         was not judged.
     """
+    if (root / EFFECTS).is_file():
+        return None  # judged in numbers, which other lines tell
     rows = read_published(root)
     position, orientation = (interval_in(rows, claim, part, place, score) for place in range(2))
     return (position, orientation) if position and orientation else None
@@ -625,6 +641,8 @@ FINDINGS: Sequence[Callable[[Path], Finding | None]] = (
     more_frames_help,
     no_difference_at_this_dose,
 )
+# Those that rest on tables alone, so that they can be told of a run that is not published, too.
+OF_ANY_RUN = FINDINGS[:3]
 
 
 def sentences(root: Path, link: str = "") -> list[str]:
@@ -708,20 +726,3 @@ def _times(factor: float) -> str:
 
 def _noise(noise: tuple[float, float]) -> str:
     return f"{100 * noise[0]:.0f} cm and {noise[1]:.0f}°"
-
-
-def change_text(factor: float) -> str:
-    """Format a factor as a change in percent."""
-    change = round(100 * (factor - 1))  # an integer has no minus zero
-    return f"{change:+d} %".replace("-", "−") if change else "0 %"
-
-
-def signed(number: float) -> str:
-    """Format a number with its sign, to two digits."""
-    return f"{number:+.2f}".replace("-", "−")
-
-
-def percent(interval: Interval) -> str:
-    """Format a factor with its limits as a change in percent."""
-    value, low, high = map(change_text, interval)
-    return f"{value} ({low.removesuffix(' %')} to {high})"

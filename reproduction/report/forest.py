@@ -14,43 +14,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from reproduction.claims.tables import PERCENT, SHARE, Part, parts_in, read_claims
 from reproduction.figures.style import BLUE, GREEN, VERMILION, Style
-from reproduction.replications.effects import NETWORKS
-from reproduction.replications.pooling import POOLED
-from reproduction.replications.tables import REMEDY, read_pooled
 from reproduction.report.stamped import digest, stamped_png, write_stamped
 from synfeal.errors import exit_status
 
 PICTURE = "claims.png"
-# Claims that one thing is best have a row for each rival; the nearest one decides.
-BEST = "C12"
+REMEDY = "pool the replications again: python -m reproduction.replications pool"
 COLORS = {"position": BLUE, "orientation": VERMILION}
 TICKS_PERCENT = (-80, -50, 0, 100, 300)
 ROW_INCHES = 0.27
-
-
-class Row(NamedTuple):
-    """A part of a claim.
-
-    Attributes:
-        claim: Id of the claim.
-        label: What is compared, and in which quantity.
-        quantity: Position or orientation, or what else is compared.
-        single: Values of the replications.
-        pooled: Pooled value and its limits.
-        printed: The paper's; NaN where it has no such number.
-    """
-
-    claim: str
-    label: str
-    quantity: str
-    single: tuple[float, ...]
-    pooled: tuple[float, float, float]
-    printed: float
 
 
 class Forest(NamedTuple):
@@ -62,8 +38,8 @@ class Forest(NamedTuple):
         verdicts: Verdict of each claim by its id.
     """
 
-    changes: list[Row]
-    shares: list[Row]
+    changes: list[Part]
+    shares: list[Part]
     verdicts: dict[str, str]
 
     @property
@@ -82,10 +58,11 @@ def read_forest(folder: Path) -> Forest:
     Raises:
         InputError: A table cannot be read.
     """
-    table, judged = read_pooled(folder)
+    table, judged, _ = read_claims(folder)
+    parts = parts_in(table)
     return Forest(
-        rows_in(table, "percent"),
-        rows_in(table, "share"),
+        [part for part in parts if part.unit == PERCENT],
+        [part for part in parts if part.unit == SHARE],
         {claim: verdict for (claim, against), verdict in judged.items() if against != "labels"},
     )
 
@@ -93,39 +70,6 @@ def read_forest(folder: Path) -> Forest:
 def write_forest(forest: Forest, out_png: Path) -> None:
     """Draw the pooled effects as PNG."""
     write_stamped(stamped_png(lambda: forest_figure(forest), forest.digest), out_png)
-
-
-def rows_in(table: pd.DataFrame, unit: str) -> list[Row]:
-    """List the parts of the claims in one unit, in their order.
-
-    Args:
-        table: ``claim_effects.csv``.
-        unit: ``percent`` or ``share``.
-    """
-    wanted = table[(table["unit"] == unit) & (table["against"].ne("labels"))]
-    wanted = wanted[wanted["claim"] != NETWORKS]
-    found = [
-        _row(values) for _, values in wanted.groupby(["claim", "part", "quantity"], sort=False)
-    ]
-    best = [row for row in found if row.claim == BEST]
-    nearest = max(best, key=lambda row: row.pooled[2], default=None)
-    kept = [row for row in found if row.claim != BEST or row is nearest]
-    return sorted(kept, key=lambda row: int(row.claim.removeprefix("C")))
-
-
-def _row(values: pd.DataFrame) -> Row:
-    """Gather a part of a claim from its rows, one of each replication and the pooled one."""
-    (pooled,) = values[values["replication"] == POOLED].to_dict("records")
-    single = values.loc[values["replication"] != POOLED, "value"]
-    part, quantity = str(pooled["part"]), str(pooled["quantity"])
-    return Row(
-        claim=str(pooled["claim"]),
-        label=part if pooled["unit"] == "share" else f"{part}, {quantity}",
-        quantity=quantity,
-        single=tuple(map(float, single)),
-        pooled=(float(pooled["value"]), float(pooled["low"]), float(pooled["high"])),
-        printed=float(pooled["printed"]),
-    )
 
 
 def forest_figure(forest: Forest) -> Figure:
@@ -154,20 +98,20 @@ def forest_figure(forest: Forest) -> Figure:
     return figure
 
 
-def _as_ratios(row: Row) -> Row:
+def _as_ratios(row: Part) -> Part:
     """Convert changes in percent to ratios."""
-    value, low, high = (1 + number / 100 for number in row.pooled)
+    value, low, high = (1 + number / 100 for number in row.decided)
     return row._replace(
         single=tuple(1 + number / 100 for number in row.single),
-        pooled=(value, low, high),
+        decided=(value, low, high),
         printed=1 + row.printed / 100,
     )
 
 
-def _draw_rows(axes: Axes, rows: Sequence[Row]) -> None:
+def _draw_rows(axes: Axes, rows: Sequence[Part]) -> None:
     for y, row in enumerate(rows):
         color = COLORS.get(row.quantity, GREEN)
-        value, low, high = row.pooled
+        value, low, high = row.decided
         axes.plot(row.single, [y] * len(row.single), "|", color=color, ms=7, mew=0.9, zorder=2)
         axes.plot([low, high], [y, y], color=color, lw=2.2, solid_capstyle="butt", zorder=2)
         name = row.quantity if row.quantity in COLORS else "other"
@@ -183,7 +127,7 @@ def _draw_rows(axes: Axes, rows: Sequence[Row]) -> None:
     axes.spines["left"].set_visible(False)
 
 
-def _name_claims(axes: Axes, rows: Sequence[Row], verdicts: dict[str, str]) -> None:
+def _name_claims(axes: Axes, rows: Sequence[Part], verdicts: dict[str, str]) -> None:
     """Write each claim with its verdict beside its first row, and rule a line above it."""
     before = None
     for y, row in enumerate(rows):

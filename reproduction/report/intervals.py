@@ -80,3 +80,20 @@ def mean_change(before: pd.DataFrame, after: pd.DataFrame, measure: str) -> Inte
     ratios = np.log([new[model] / old[model] for model in old])
     value, low, high = np.exp(ratios.mean(axis=0))
     return Interval(float(value), float(low), float(high))
+
+
+def change_text(factor: float) -> str:
+    """Format a factor as a change in percent."""
+    change = round(100 * (factor - 1))  # an integer has no minus zero
+    return f"{change:+d} %".replace("-", "−") if change else "0 %"
+
+
+def signed(number: float) -> str:
+    """Format a number with its sign, to two digits."""
+    return f"{number:+.2f}".replace("-", "−")
+
+
+def percent(interval: Interval) -> str:
+    """Format a factor with its limits as a change in percent."""
+    value, low, high = map(change_text, interval)
+    return f"{value} ({low.removesuffix(' %')} to {high})"

@@ -19,10 +19,11 @@ from typing import Any
 
 import pandas as pd
 
-from reproduction.claims.table import claims_markdown
+from reproduction.claims.tables import has_claims, read_claims
 from reproduction.claims.verdicts import published_claims
 from reproduction.real.findings import real_findings, real_headline, real_short, real_table
-from reproduction.replications.tables import REPLICATIONS, has_pooled
+from reproduction.replications.pooling import REPLICATIONS
+from reproduction.report.claim_lines import as_markdown, claim_lines
 from reproduction.report.claims_table import claims_table
 from reproduction.report.effects_figure import effects_digest, effects_picture
 from reproduction.report.findings import (
@@ -46,9 +47,13 @@ from reproduction.report.paper_tables import (
     making,
     meshes_beside_print,
 )
-from reproduction.report.pooled import pooled_lines
 from reproduction.report.publish import PUBLISHED, RESULTS
-from reproduction.report.published_claims import read_published, rows_now, rules_note
+from reproduction.report.published_claims import (
+    claims_markdown,
+    read_published,
+    rows_now,
+    rules_note,
+)
 from reproduction.report.realisations import PAPER_FRAMES, realisations_table
 from reproduction.report.reproduced import effects, reproduced
 from reproduction.report.run_anew import run_anew, training_runs
@@ -220,7 +225,9 @@ def difficulty(folder: Path = RESULTS / "benchmarks" / "scene_difficulty") -> st
 def lines(root: Path) -> str:
     """Tell what was reproduced: by the pooled replications, once there are any."""
     replications = root.with_name(REPLICATIONS)
-    return pooled_lines(replications) if has_pooled(replications) else reproduced(root)
+    if has_claims(replications):
+        return as_markdown(claim_lines(read_claims(replications)))
+    return reproduced(root)
 
 
 def verdicts(root: Path) -> str:
@@ -337,7 +344,7 @@ def stale(check: bool) -> list[Path]:
     drawn = panels(shown) if can_tell(shown) else []
     if drawn and not is_drawn_from(FIGURE, drawn):
         writers[FIGURE] = partial(write_findings_figure, drawn, FIGURE)
-    if has_pooled(PUBLISHED / REPLICATIONS):
+    if has_claims(PUBLISHED / REPLICATIONS):
         forest = read_forest(PUBLISHED / REPLICATIONS)
         if not shows(FOREST_FIGURE, forest.digest):
             writers[FOREST_FIGURE] = partial(write_forest, forest, FOREST_FIGURE)

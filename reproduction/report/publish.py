@@ -21,7 +21,7 @@ from synfeal.records.files import atomic_directory
 
 RESULTS = Path("results")
 PUBLISHED = RESULTS / "published"
-FINISHED = ("claims.csv", "summary.md", "provenance.json", "benchmarks.csv")
+FINISHED = ("claims.csv", "claim_effects.csv", "summary.md", "provenance.json", "benchmarks.csv")
 
 
 def publish(root: Path, target: Path, pages: Iterable[Path]) -> None:

@@ -1,4 +1,4 @@
-"""Published verdicts, and the rules they were made by.
+"""Verdicts of single runs as they were published, in words, and the rules they were made by.
 
 The errors of single frames are not tracked, so that verdicts on localizers cannot be judged anew
 when the rules change: they stand as they were made. Three can: C4 from the counts of batches, and
@@ -14,31 +14,36 @@ from pathlib import Path
 from typing import Literal
 
 from reproduction.claims.rules import frozen_rules
-from reproduction.claims.table import verdict_counts
-from reproduction.claims.untrained import few_verdict
-from reproduction.claims.verdicts import GROUPS, MEANINGS, Verdict
-from reproduction.replications.tables import REPLICATIONS
+from reproduction.claims.tables import EFFECTS
+from reproduction.claims.verdicts import FEW, GROUPS, Verdict, published_claims
 from reproduction.report.intervals import Interval
+from reproduction.statistics.limits import share_limits
 from reproduction.tables.assistance import PUBLISHED_ASSISTED, PUBLISHED_SCENE, TOTAL
 from reproduction.tables.assistance import SCHEMA as ASSISTANCE
 from synfeal.records.tables import read_frame, read_records, rows_of
 
-# The frozen words for a smaller effect say that it may be none, also where its limits exclude none.
-SHOWN_MEANINGS = MEANINGS | {
-    Verdict.LESS: "certainly smaller than printed; the limits tell whether there is any"
-}
+HEADINGS = (
+    "",
+    "Claim",
+    "Published",
+    "Against the labels (the paper's protocol)",
+    "Verdict",
+    "Against the true poses",
+    "Verdict",
+)
 # Of files without a column ``rules``.
 BEFORE_FREEZE = "2026-11-22g"
 Row = Mapping[str, str]
 
 
 def published_runs(published: Path) -> list[Path]:
-    """List the folders of the published runs that judge claims, by name.
+    """List the folders of published runs whose verdicts are words, by name.
 
-    Replications judge claims together and are no such run.
+    Pooled replications, and runs judged as they are, have effects as numbers and are not among
+    them.
     """
     folders = (path.parent for path in published.glob("*/claims.csv"))
-    return sorted(folder for folder in folders if folder.name != REPLICATIONS)
+    return sorted(folder for folder in folders if not (folder / EFFECTS).is_file())
 
 
 def read_published(root: Path) -> list[dict[str, str]]:
@@ -50,6 +55,44 @@ def read_published(root: Path) -> list[dict[str, str]]:
 def rules_of(rows: Sequence[Row]) -> str:
     """Return the rules that verdicts were made by."""
     return rows[0].get("rules") or BEFORE_FREEZE
+
+
+def claims_markdown(rows: Sequence[Row]) -> str:
+    """Format the claims by group: figures and verdicts under both scores, remarks below.
+
+    Rows of an earlier version, which have no groups, are grouped as the claims are now.
+    """
+    groups = {claim.id: claim.group for claim in published_claims()}
+    parts = []
+    for group, title in GROUPS.items():
+        own = [row for row in rows if groups.get(row["id"]) == group]
+        if own:
+            lines = [HEADINGS, ["---"] * len(HEADINGS), *map(_short, own)]
+            table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+            parts += [f"### Claims {title}", table]
+    remarks = [f"- {row['id']}: {remark}" for row in rows for remark in _remarks(row)]
+    return "\n\n".join(part for part in (*parts, "\n".join(remarks)) if part) + "\n"
+
+
+def verdict_counts(rows: Sequence[Row], score: str) -> dict[str, Counter[str]]:
+    """Count the claims of each group by verdict, under a score."""
+    groups = {claim.id: claim.group for claim in published_claims()}
+    return {
+        group: Counter(row[f"verdict_{score}"] for row in rows if groups[row["id"]] == group)
+        for group in GROUPS
+    }
+
+
+def few_verdict(counts: Mapping[str, tuple[int, int]]) -> Verdict:
+    """Decide whether few batches of every method are assisted, one-sided at 5 %.
+
+    Args:
+        counts: Number of assisted batches, and of all, by method.
+    """
+    if all(share_limits(*count, 0.9)[1] < FEW for count in counts.values()):
+        return Verdict.HOLDS
+    least = [share_limits(*count, 1 - 0.1 / len(counts))[0] for count in counts.values()]
+    return Verdict.OPPOSITE if max(least) > FEW else Verdict.UNDECIDED
 
 
 def judged_now(rows: Sequence[Row], root: Path) -> dict[str, Verdict]:
@@ -131,3 +174,21 @@ def interval_in(
     if value is None or ends is None:
         return None
     return Interval(*(1 + float(text) / 100 for text in (value[1], ends[1], ends[2])))
+
+
+def _short(row: Row) -> list[str]:
+    same = row["measured_true"] == row["measured_labels"]
+    measured = row["measured_labels"], "the same" if same else row["measured_true"]
+    # The statistic the rule decides on; what is only reported beside it stays in the CSV.
+    first, second = (re.split("; (?:sign tests|tau)", text)[0] for text in measured)
+    verdicts = [f"**{row[f'verdict_{score}']}**" for score in ("labels", "true")]
+    if row.get("dose"):
+        first = f"{first} ({row['dose']})"
+    head = [row["id"], row["statement"], row["published"]]
+    return [*head, first or "–", verdicts[0], second if first else "–", verdicts[1]]
+
+
+def _remarks(row: Row) -> list[str]:
+    found = {row["verdict_labels"], row["verdict_true"]}
+    untested = found & {Verdict.NOT_TESTABLE, Verdict.NOT_LEARNT}
+    return [text for text in (row["reason"] if untested else "", row["footnote"]) if text]

@@ -12,14 +12,9 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from reproduction.report.findings import (
-    paired_changes,
-    percent,
-    read_table,
-    sfm_training_labels,
-)
+from reproduction.report.findings import paired_changes, read_table, sfm_training_labels
 from reproduction.report.fresh import SEEN_SEED
-from reproduction.report.intervals import Interval
+from reproduction.report.intervals import Interval, percent
 from reproduction.report.published_claims import published_runs, read_published
 from reproduction.tables.sheet import markdown_table
 from synfeal.records.tables import rows_of

@@ -11,14 +11,11 @@ from reproduction.claims.evidence import QUANTITIES
 from reproduction.report.findings import (
     CONTROLS,
     LABELS,
-    change_text,
     paired_changes,
-    percent,
     read_table,
     sfm_training_labels,
-    signed,
 )
-from reproduction.report.intervals import Interval
+from reproduction.report.intervals import Interval, change_text, percent, signed
 from reproduction.report.paper_cells import SIZES, paper_cells, rank_correlations
 from reproduction.report.published_claims import read_published
 from synfeal.errors import InputError

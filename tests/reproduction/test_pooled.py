@@ -7,19 +7,16 @@ import pytest
 from scipy.stats import t
 
 from benchmarks.pooled_coverage import coverage
-from reproduction.claims.verdicts import Verdict
-from reproduction.replications.judge import (
-    Part,
+from reproduction.claims.judge import (
+    Condition,
     judge,
     judge_best,
     judge_few,
     judge_many,
-    odds_of,
-    part_verdict,
-    percent,
-    pooled_odds,
-    share,
+    verdict_of,
 )
+from reproduction.claims.verdicts import Verdict
+from reproduction.replications.pooling import Part, limits_of, odds_of, pooled_odds, share
 from reproduction.statistics.pooled import pool
 
 
@@ -72,7 +69,8 @@ def test_five_replications_cover_the_truth_as_often_as_they_say(share_between):
 
 def part(percent_changes, asked="size", sign=-1, printed=-50.0):
     values = tuple(math.log1p(change / 100) for change in percent_changes)
-    return Part("a part", asked, sign, values, (1e-6,) * len(values), math.log1p(printed / 100))
+    pooled = Part(values, (1e-6,) * len(values))
+    return Condition(asked, sign, pooled.limits, math.log1p(printed / 100))
 
 
 @pytest.mark.parametrize(
@@ -87,13 +85,13 @@ def part(percent_changes, asked="size", sign=-1, printed=-50.0):
     ],
 )
 def test_an_effect_is_judged_by_the_region_its_pooled_limits_lie_in(changes, verdict):
-    assert part_verdict(part(changes)) == verdict
+    assert verdict_of(part(changes)) == verdict
 
 
 def test_a_direction_asks_for_five_percent_and_an_order_for_less():
     small = (-2, -2.1, -1.9, -2, -2.2)
-    assert part_verdict(part(small, "direction")) == Verdict.NEGLIGIBLE
-    assert part_verdict(part(small, "order")) == Verdict.HOLDS
+    assert verdict_of(part(small, "direction")) == Verdict.NEGLIGIBLE
+    assert verdict_of(part(small, "order")) == Verdict.HOLDS
 
 
 def test_a_claim_holds_with_all_parts_and_is_mixed_with_one_that_is_refuted():
@@ -111,13 +109,11 @@ def test_shares_of_batches_are_judged_beside_a_third_and_a_half():
     value, low, high = share(pooled_odds(few))
     assert low < 2.4 / 34 < high
     assert value == pytest.approx(2.4 / 34, abs=0.02)
-    assert judge_few({"sfm": few, "rgbd-g2o": few}) == Verdict.HOLDS
-    assert judge_few({"sfm": few, "rgbd-g2o": most}) == Verdict.OPPOSITE
-    assert (judge_many(most), judge_many(few)) == (Verdict.HOLDS, Verdict.OPPOSITE)
+    assert judge_few({"sfm": limits_of(few), "rgbd-g2o": limits_of(few)}) == Verdict.HOLDS
+    assert judge_few({"sfm": limits_of(few), "rgbd-g2o": limits_of(most)}) == Verdict.OPPOSITE
+    assert (judge_many(limits_of(most)), judge_many(limits_of(few))) == (
+        Verdict.HOLDS,
+        Verdict.OPPOSITE,
+    )
     value, low, high = share(pooled_odds(odds_of([(0, 34)] * 5)))
     assert 0 < low < value < 0.05 < high < 0.15  # never assisted: as many batches tell no more
-
-
-def test_percent_is_the_change_a_ratio_stands_for():
-    assert percent(math.log(0.45)) == pytest.approx(-55)
-    assert percent(math.inf) == math.inf

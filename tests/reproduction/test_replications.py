@@ -11,7 +11,18 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+from reproduction.claims.effects import (
+    BOTH,
+    MOVED,
+    OWN,
+    PAPERS_FIVE,
+    RIVALS,
+    TURNED,
+    effects_of,
+    printed_effects,
+)
 from reproduction.claims.evidence import COMMON, Cell
+from reproduction.claims.tables import CLAIMS, EFFECTS, PERCENT, POOLED, parts_in, read_claims
 from reproduction.claims.verdicts import published_claims
 from reproduction.config.load import load_config
 from reproduction.replications.__main__ import main as replications
@@ -21,30 +32,19 @@ from reproduction.replications.archive import (
     FAILED,
     KEYS,
     LABEL_TABLES,
-    OWN,
     PROVENANCE,
     SECONDS,
     UNITS,
+    Archive,
     read_archived,
     remaining,
     write_archive,
     write_errors,
 )
-from reproduction.replications.effects import (
-    BOTH,
-    MOVED,
-    PAPERS_FIVE,
-    RIVALS,
-    TURNED,
-    Archive,
-    effects_of,
-    printed_effects,
-)
-from reproduction.replications.pooling import CLAIMS, EFFECTS, POOLED, write_pooled
-from reproduction.replications.tables import read_pooled
+from reproduction.replications.pooling import write_pooled
+from reproduction.report.claim_lines import as_markdown, claim_lines, claims_beside_print
 from reproduction.report.claims_table import claims_table
-from reproduction.report.forest import PICTURE, main, rows_in
-from reproduction.report.pooled import pooled_claims, pooled_lines
+from reproduction.report.forest import PICTURE, main
 from reproduction.report.published_claims import published_runs
 from synfeal.errors import InputError
 from synfeal.records.tables import write_frame
@@ -128,21 +128,26 @@ def test_the_forest_plot_shows_the_factors_and_the_nearest_rival(pooled):
     assert main([str(pooled)]) == 0
     with Image.open(pooled / PICTURE) as picture:
         assert min(picture.size) > 500
-    rows = {(row.claim, row.label): row for row in rows_in(read_pooled(pooled).effects, "percent")}
+    parts = [part for part in parts_in(read_claims(pooled).effects) if part.unit == PERCENT]
+    rows = {(row.claim, row.label): row for row in parts}
     row = rows["C7", "80k, not 6k, position"]
-    assert row.pooled[0] == pytest.approx(-50, abs=0.1)
+    assert row.decided[0] == pytest.approx(-50, abs=0.1)
     assert len(row.single) == 3
     assert row.printed < 0
     # PoseNet2 from scratch at 80k has 0.8 times the error of the other networks there, and less
     # than that of anything else: one row stands for its 29 rivals.
     (best,) = (row for row in rows.values() if row.claim == "C12")
     assert best.label.endswith(", scratch, 80k, position")
-    assert best.pooled[0] == pytest.approx(-20, abs=0.1)
+    assert best.decided[0] == pytest.approx(-20, abs=0.1)
     assert not any(claim == "networks" for claim, _ in rows)
 
 
+def lines_of(folder):
+    return as_markdown(claim_lines(read_claims(folder))).splitlines()
+
+
 def test_lines_tell_the_factors_and_begin_with_the_verdict(pooled):
-    size, noise, networks, labels, start = pooled_lines(pooled).splitlines()
+    size, noise, networks, labels, start = lines_of(pooled)
     # Errors fall to 0.5 and 0.28; labels with noise have 3 and 5 times the error.
     assert size.startswith("- **Reproduced: more frames, smaller errors.** ")
     assert re.findall(r"([+−]\d+) % \(", size) == ["−50", "−50", "−72", "−72"]
@@ -168,17 +173,20 @@ def test_lines_follow_the_verdicts(pooled, tmp_path):
     judged.loc[judged["claim"] == "C8", "verdict"] = "undecided"
     judged.loc[judged["claim"] == "C10", "verdict"] = "opposite"
     judged.to_csv(tmp_path / CLAIMS, index=False)
-    size, *_, start = pooled_lines(tmp_path).splitlines()
+    size, *_, start = lines_of(tmp_path)
     assert size.startswith("- **Reproduced / Undecided: ")
     assert start.startswith("- **Not reproduced: ")
 
 
 def test_the_table_of_claims_has_printed_ours_and_verdict(pooled, tmp_path):
-    told = {line.split("|")[1].strip(): line for line in pooled_claims(pooled).splitlines()[2:]}
+    told = {
+        line.split("|")[1].strip(): line
+        for line in claims_beside_print(read_claims(pooled)).splitlines()[2:]
+    }
     assert list(told) == [claim.id for claim in published_claims()]
     assert "80k, not 6k, position −50 % (−50 to −50 %)" in told["C7"]
     assert told["C7"].endswith("| **holds** |")
-    assert "kinect-fusion 10 % (" in told["C15"]
+    assert "KinectFusion 10 % (" in told["C15"]
     assert told["C9"].endswith("| – | not judged |")
     assert told["C12"].count("position") == 1  # the nearest rival alone
     # Pages tell the runs with fresh seeds until replications are pooled.
@@ -189,7 +197,7 @@ def test_the_table_of_claims_has_printed_ours_and_verdict(pooled, tmp_path):
     assert "not judged yet" in before
     shutil.copytree(pooled, published / "replications")
     assert [run.name for run in published_runs(published)] == ["night"]
-    assert claims_table(published / "night") == pooled_claims(pooled)
+    assert claims_table(published / "night") == claims_beside_print(read_claims(pooled))
 
 
 def test_effects_are_the_factors_that_errors_were_made_with(pooled):

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from reproduction.claims.tables import read_claims
 from reproduction.report.html import page
 from reproduction.report.html.page import LARGEST_SIDE_PX, data_address, figure_files, missing_rows
-from reproduction.report.html.tables import claims_table, read_claims, score_table
+from reproduction.report.html.tables import claims_table, score_table
 from reproduction.tables.cells import read_cells
 from synfeal.errors import InputError
 from synfeal.records.files import read_json, write_json
@@ -67,7 +68,7 @@ def numbers_of(row, style):
 
 # By table: a column, what is written into it, and how that reads on the page.
 CHANGED = {
-    "claims": ("measured_labels", "p -47.25 %", "p -47.25 %"),
+    "claim_effects": ("value", "-47.25", "−47 % (−"),
     "tables/table1_meshes": ("vertices", "51234", "51,234"),
     "tables/recall": ("recall_5cm_5deg", "0.6251", "62.5 %"),
     "tables/assistance": ("last_m_before_median", "77.875", "77.88 m, "),
@@ -111,19 +112,21 @@ def test_a_score_changes_the_table_and_the_switch_has_both(root):
 
 
 def test_claims_carry_both_scores_escaped_and_no_unknown_verdict(finished, root):
-    claims = read_claims(finished / "claims.csv")
-    html = claims_table(claims)
-    assert "A &lt;b&gt;&amp; c" in html
+    html = claims_table(read_claims(finished))
     labels = re.findall(r'<div class="labels">(.*?)</div>', html)
     true = re.findall(r'<div class="true">(.*?)</div>', html)
-    assert labels[0].startswith("p -41.5 %<small>95 %: p -50.0 % to -9.0 %")
-    assert true[0].startswith("p -33.5 %<small>95 %: p -44.0 % to +3.0 %")
-    assert text_of(labels[1]) == "✓ holds reaches it"
-    assert text_of(true[1]) == "? undecided stays short"
+    both = "exact labels, not sfm, position: {0};<br>exact labels, not sfm, orientation: {0}"
+    assert labels[0] == both.format("−42 % (−50 to −9 %)")
+    assert true[0] == both.format("−34 % (−44 to +3 %)")
+    assert text_of(labels[1]) == "✓ holds"
+    assert text_of(true[1]) == "? undecided stays <short>"
+    # What the run could not test has one verdict for both scores.
+    assert labels[2:] == ["–", '<span class="badge untestable">' + labels[3].split(">", 1)[1]]
+    assert "no row &lt;40k&gt;" in labels[3]
     path = root / "claims.csv"
     path.write_text(path.read_text().replace(",holds,", ",perhaps,"))
-    with pytest.raises(InputError, match="claim 'C2': verdict_labels must be one of"):
-        read_claims(path)
+    with pytest.raises(InputError, match="claim 'C2': verdict must be one of"):
+        read_claims(root)
 
 
 def test_the_page_names_what_it_lacks(root):
@@ -138,7 +141,7 @@ def test_the_page_names_what_it_lacks(root):
 
 def test_untested_claims_and_rows_left_out_are_listed_and_nothing_else_is_needed(root):
     text = text_of(written(root))
-    assert "C15 is not testable here: no row 40k" in text
+    assert "C15 is not testable here: no row <40k>" in text
     assert (
         "Table 4: 4 of the paper's 8 rows are not in this profile's table of experiments:"
         " Sanctuary 6k; Sanctuary 20k; Sanctuary 40k; Sanctuary 95k." in text

@@ -60,8 +60,8 @@ def test_one_switch_changes_every_table(page, tmp_path):
       return [before, after, read()];
     """
     before, after, again = asked(page, tmp_path, probe)
-    assert before[:2] == [["1.00 m", "0.90–1.20, paths only", "0.34 m"], ["✓ holds", "reaches it"]]
-    true = [["0.50 m", "0.45–0.60, paths only", "0.34 m"], ["? undecided", "stays short"]]
+    assert before[:2] == [["1.00 m", "0.90–1.20, paths only", "0.34 m"], ["✓ holds"]]
+    true = [["0.50 m", "0.45–0.60, paths only", "0.34 m"], ["? undecided", "stays <short>"]]
     assert after[:2] == true
     assert again == before
 

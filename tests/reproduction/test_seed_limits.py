@@ -1,6 +1,7 @@
 """Limits over test paths and training runs, against simulations whose truth is known."""
 
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,8 @@ import pandas as pd
 import pytest
 from scipy.stats import t as student
 
-from reproduction.claims.verdicts import Condition, Verdict, verdict_of
+from reproduction.claims.judge import Condition, verdict_of
+from reproduction.claims.verdicts import Verdict
 from reproduction.report.deviations import seed_deviations
 from reproduction.statistics.limits import score_of
 from reproduction.statistics.seeds import (
@@ -112,7 +114,9 @@ def test_wrong_verdicts_are_rare(n_seeds, most):
             for error in (2.0, 6.0, 12.0):
                 for _ in range(60):
                     sample, layout = simulated(rng, truth, share, error, 1, n_seeds)
-                    verdict = verdict_of(Condition("", sample, layout, 55.0))
+                    logs = np.log1p(sample / 100)
+                    of_sample = partial(limits, logs, layout)
+                    verdict = verdict_of(Condition("size", 1, of_sample, math.log1p(0.55)))
                     found.append(verdict not in {*RIGHT[truth], Verdict.UNDECIDED})
         wrong[share] = np.mean(found)
     assert max(wrong.values()) <= most, wrong

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from baselines.config.learning import MODELS
 from reproduction.claims import evidence as reading
 from reproduction.claims.evidence import evidence_of
-from reproduction.claims.table import claim_rows
+from reproduction.claims.run import claims_of_run
 from reproduction.design.experiments import SHARES
 from reproduction.statistics.seeds import Borrowed
 from reproduction.tables.cells import key_of, published_cells
@@ -60,10 +60,10 @@ class Results:
         columns = [np.broadcast_to(values, (len(self.table), 2)) for values in both]
         write_errors(self.root, row, model, np.hstack(columns), repetition)
 
-    def rows(self):
-        """``claims.csv`` by claim."""
+    def judged(self):
+        """What the run says about the claims."""
         design = design_of(self.design, more_scenes=self.more_scenes)
-        return {row["id"]: row for row in claim_rows(evidence_of(design, self.root))}
+        return claims_of_run(evidence_of(design, self.root))
 
 
 def far_apart(n_paths, metres, degrees):

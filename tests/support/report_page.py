@@ -6,7 +6,8 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from reproduction.claims.table import COLUMNS
+from reproduction.claims.tables import PERCENT, THIS_RUN, write_claims
+from reproduction.claims.verdicts import Verdict
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
@@ -15,26 +16,13 @@ from tests.support.report_results import (
     METHODS_RUN,
     complete_results,
     shipped_design,
-    write_rows,
 )
 
 RED = (220, 20, 20)
 PLANS = {"train": [[1.0, 1.0, 1.0], [3.0, 1.0, 1.0]], "test": [[1.0, 2.0, 1.0], [3.0, 2.0, 1.5]]}
-CLAIM = dict.fromkeys(COLUMNS, "") | {
-    "id": "C2",
-    "section": "4.1",
-    "statement": "A <b>& c",
-    "published": "p -55 %",
-    "measured_labels": "p -41.5 %",
-    "measured_true": "p -33.5 %",
-    "interval_labels": "p -50.0 % to -9.0 %",
-    "interval_true": "p -44.0 % to +3.0 %",
-    "verdict_labels": "holds",
-    "verdict_true": "undecided",
-    "reason": "labels: reaches it; true: stays short",
-}
-UNTESTED = CLAIM | dict.fromkeys(("verdict_labels", "verdict_true"), "not testable here")
-UNTESTED |= {"id": "C15", "statement": "Another.", "reason": "no row 40k"}
+# Of C2 by score: both of its effects with limits, percent, and the verdict.
+CLAIM = {"labels": ((-41.5, -50.0, -9.0), "holds"), "true": ((-33.5, -44.0, 3.0), "undecided")}
+UNTESTED = "no row <40k>"
 PUBLISHED = CONFIG.parent / "results/published/mini"
 SIDE_TABLES = ("speed_vs_error", "recall", "assistance", "label_error", "references")
 
@@ -47,13 +35,27 @@ def large_room_design():
 def page_results(root):
     """Known scores and claims, two figures, one scene; other tables as a run published them."""
     complete_results(root)
-    write_rows(root / "claims.csv", COLUMNS, [CLAIM, UNTESTED])
+    write_known_claims(root)
     for name in SIDE_TABLES:
         shutil.copy(PUBLISHED / "tables" / f"{name}.csv", root / "tables")
     shutil.copy(PUBLISHED / "provenance.json", root)
     write_scene(root)
     write_figures(root / "figures")
     return root
+
+
+def write_known_claims(root):
+    """The verdict on C2 by either score, and C15 that the run could not test."""
+    same = {"claim": "C2", "part": "exact labels, not sfm", "replication": THIS_RUN}
+    rows, verdicts = [], {}
+    for against, (numbers, verdict) in CLAIM.items():
+        ends = dict(zip(("value", "low", "high"), numbers, strict=True))
+        for quantity in ("position", "orientation"):
+            row = {**same, "quantity": quantity, "against": against, **ends, "printed": -55.0}
+            rows.append(row | {"unit": PERCENT})
+        verdicts["C2", against] = Verdict(verdict)
+    verdicts["C15", ""] = Verdict.NOT_TESTABLE
+    write_claims(root, rows, verdicts, 1, {("C15", ""): UNTESTED, ("C2", "true"): "stays <short>"})
 
 
 def write_scene(root):

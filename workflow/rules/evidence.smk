@@ -129,12 +129,11 @@ rule claims:
         errors=FILES.of_runs("errors.csv"),
         common_errors=FILES.of_runs("common_errors.csv"),
         labels=under("labels/{set}/{split}.csv", set=FILES.true_sets, split=SPLITS),
-        estimated=under("labels/{set}/train.csv", set=FILES.estimated_sets),
         assistance=under("labels/{set}/assistance.json", set=FILES.estimated_sets),
-        properties=under("scenes/{scene}/properties.json", scene=FILES.scenes),
         speed=under("scenes/{scene}/collection_speed.json", scene=FILES.scenes),
     output:
         csv=f"{ROOT}/claims.csv",
+        effects=f"{ROOT}/claim_effects.csv",
     log:
         f"{ROOT}/logs/claims.log",
     benchmark:
@@ -145,7 +144,6 @@ rule claims:
         mem_mb=grown(1000),
     params:
         design=dump(DESIGN),
-        seed=CONFIG.seed,
     script:
         "../scripts/run_claims.py"
 
@@ -155,7 +153,7 @@ RESULTS = [
     *under("tables/{table}.csv", table=[*FILES.tables, *MADE]),
     rules.figures.output.dir,
     rules.summary.output.md,
-    rules.claims.output.csv,
+    *rules.claims.output,
 ]
 
 

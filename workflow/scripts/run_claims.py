@@ -1,15 +1,13 @@
-"""Write one row per claim of the paper, columns :data:`COLUMNS`."""
+"""Write the effects that the paper claims, as this run has them, and a verdict on each claim."""
 
 from pathlib import Path
 
-from reproduction.claims.table import write_claims
+from reproduction.claims.run import write_run_claims
 from reproduction.runs.job import run_job
 
 run_job(
     snakemake.log[0],
-    write_claims,
+    write_run_claims,
     design=snakemake.params.design,
     root=Path(snakemake.output.csv).parent,
-    seed=snakemake.params.seed,
-    out_csv=snakemake.output.csv,
 )

@@ -15,17 +15,18 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from PIL import Image
 
+from reproduction.claims.tables import ClaimTables, has_claims, read_claims
 from reproduction.claims.verdicts import Verdict
 from reproduction.config.tables import KEYS
 from reproduction.design.experiments import Design, Experiment
 from reproduction.design.side_tables import SIDE_TABLES
 from reproduction.figures.registry import CAPTIONS
-from reproduction.report.findings import can_tell, findings
+from reproduction.report.claim_lines import claim_lines
+from reproduction.report.findings import OF_ANY_RUN, can_tell, findings
 from reproduction.report.findings_figure import panels, picture
 from reproduction.report.html.provenance import cost_sentence, origin_html, read_origin
 from reproduction.report.html.tables import (
     claims_table,
-    read_claims,
     render,
     score_table,
     side_html,
@@ -104,7 +105,7 @@ def write_report(
     """
     rowless = [name for name in SIDE_TABLES if name not in side_tables]
     cells = {table: read_cells(table, design, root) for table in design.tables}
-    claims = read_claims(root / CLAIMS) if (root / CLAIMS).exists() else []
+    claims = read_claims(root) if has_claims(root) else None
     origin = read_origin(root / PROVENANCE) if (root / PROVENANCE).exists() else {}
     figures = figure_files(root / "figures", CAPTIONS)
     figures |= figure_files(root.with_name(REAL) / "figures", REAL_CAPTIONS)
@@ -113,7 +114,7 @@ def write_report(
         "page.html",
         profile=root.name,
         opening=opening(root),
-        found=findings(root) if can_tell(root) else [],
+        found=found_in(root, claims),
         sentences=[
             *run_sentences(cells),
             *([cost_sentence(origin)] if origin else []),
@@ -139,11 +140,7 @@ def write_report(
                 * bool(rowless)
             ),
             *missing_rows(design.rows),
-            *(
-                f"{claim['id']} is not testable here: {claim['reason'] or 'no reason given'}"
-                for claim in claims
-                if Verdict.NOT_TESTABLE in (claim["verdict_labels"], claim["verdict_true"])
-            ),
+            *(untested(claims) if claims else []),
             *(
                 f"Not drawn, for lack of its data in this profile: figure {name}."
                 for name in CAPTIONS
@@ -153,6 +150,29 @@ def write_report(
         viewer_js=Markup(viewer_js()),
     )
     write_text(out_html, page)
+
+
+def found_in(root: Path, claims: ClaimTables | None) -> list[dict[str, str]]:
+    """List what the run found: of the paper's effects, then of methods and errors of our own."""
+    lines = claim_lines(claims) if claims else []
+    told = [
+        {"headline": f"{line.outcome}.", "evidence": line.numbers, "table": "claims-table"}
+        for line in lines
+    ]
+    for finding in findings(root, OF_ANY_RUN) if can_tell(root) else []:
+        evidence = f"{finding.evidence} Measured against {finding.against}."
+        told.append({"headline": finding.headline, "evidence": evidence, "table": finding.table})
+    return told
+
+
+def untested(claims: ClaimTables) -> list[str]:
+    """Say which claims the run could not test, and why."""
+    reasons = {
+        claim: claims.reasons[claim, against]
+        for (claim, against), verdict in claims.verdicts.items()
+        if verdict == Verdict.NOT_TESTABLE
+    }
+    return [f"{claim} is not testable here: {reason}" for claim, reason in reasons.items()]
 
 
 def opening(root: Path) -> list[dict[str, str]]:

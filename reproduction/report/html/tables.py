@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import groupby, product
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from reproduction.claims.table import COLUMNS, verdict_counts
-from reproduction.claims.verdicts import GROUPS, Verdict
+from reproduction.claims.effects import Against
+from reproduction.claims.tables import ClaimTables, parts_in
+from reproduction.claims.verdicts import GROUPS, MEANINGS, Verdict, published_claims
 from reproduction.design.experiments import FROM_SCRATCH
 from reproduction.design.side_tables import SIDE_TABLES
-from reproduction.report.published_claims import SHOWN_MEANINGS
+from reproduction.report.claim_lines import part_label, part_text
 from reproduction.tables.columns import SCORES, Column, SideLayout, cells_of
 from reproduction.tables.layouts import CHANGE
 from reproduction.tables.sheet import PAPER, Line, Value, footnotes
 from reproduction.tables.write import one_run_remarks, sheet_of
-from synfeal.errors import InputError
-from synfeal.records.tables import TEXT, read_frame, records_of
+from synfeal.records.tables import records_of
 
 ENVIRONMENT = Environment(
     loader=PackageLoader("reproduction.report.html"),
@@ -132,47 +132,50 @@ BADGES: Mapping[str, tuple[str, str]] = {
     Verdict.NOT_TESTABLE: ("–", "untestable"),
     Verdict.BY_CONSTRUCTION: ("·", "untestable"),
 }
+AGAINST: tuple[Against, ...] = ("labels", "true")  # the switch's two scores
 CLAIM_HEADINGS = ("Claim", "The paper says", "Published", "Measured here", "Verdict")
-Claims = Sequence[Mapping[str, str]]
 
 
-def read_claims(path: Path) -> Claims:
-    """Read the rows of ``claims.csv``.
-
-    Raises:
-        InputError: A verdict is none of those there are.
-    """
-    rows = records_of(read_frame(path, dict.fromkeys(COLUMNS, TEXT)))
-    for row in rows:
-        for score in SCORES:
-            if row[f"verdict_{score}"] not in BADGES:
-                where = f"{path}: claim '{row['id']}': verdict_{score}"
-                raise InputError(f"{where} must be one of {', '.join(BADGES)}")
-    return rows
-
-
-def claims_table(claims: Claims) -> Markup:
+def claims_table(tables: ClaimTables) -> Markup:
     """Format one row per claim; measured values, limits and verdicts follow the switch."""
+    parts = {score: parts_in(tables.effects, score) for score in AGAINST}
+    rows: list[dict[str, Any]] = [
+        {
+            "claim": claim,
+            "measured": {
+                score: [
+                    (part_label(part), part_text(part)) for part in own if part.claim == claim.id
+                ]
+                for score, own in parts.items()
+            },
+            "verdicts": {score: tables.verdict(claim.id, score) for score in AGAINST},
+        }
+        for claim in published_claims()
+    ]
     columns = [Column(title) for title in CLAIM_HEADINGS]
-    values = {"claims": claims, "columns": columns, "scores": list(SCORES), "badges": BADGES}
-    return render("claims.html", **values, reason=reason_of)
+    judged = [row for row in rows if all(row["verdicts"].values())]
+    return render("claims.html", rows=judged, columns=columns, scores=AGAINST, badges=BADGES)
 
 
-def verdict_table(claims: Claims) -> Markup:
+def verdict_table(tables: ClaimTables) -> Markup:
     """Tabulate the claims of each group by verdict, under either score."""
-    counts = {score: verdict_counts(claims, score) for score in SCORES}
-    found = {claim[f"verdict_{score}"] for claim in claims for score in SCORES}
+    counts = {score: verdict_counts(tables, score) for score in AGAINST}
+    found = {verdict for groups in counts.values() for own in groups.values() for verdict in own}
     return render(
         "verdicts.html",
         badges=BADGES,
         groups=GROUPS,
         verdicts=[verdict for verdict in BADGES if verdict in found],
         counts=counts,
-        meanings=SHOWN_MEANINGS,
+        meanings=MEANINGS,
     )
 
 
-def reason_of(reason: str, score: str) -> str:
-    """Return the reason of a verdict; that of ``score`` where the two scores have their own."""
-    found = re.fullmatch(r"labels: (?P<labels>.*); true: (?P<true>.*)", reason)
-    return found[score] if found else reason
+def verdict_counts(tables: ClaimTables, score: Against) -> dict[str, Counter[str]]:
+    """Count the claims of each group by verdict, under a score."""
+    counts: dict[str, Counter[str]] = {group: Counter() for group in GROUPS}
+    for claim in published_claims():
+        found = tables.verdict(claim.id, score)
+        if found is not None:
+            counts[claim.group][found[0]] += 1
+    return counts

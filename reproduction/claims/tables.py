@@ -1,0 +1,196 @@
+"""``claim_effects.csv`` and ``claims.csv``: effects as numbers, and the verdict on each claim.
+
+A run writes both of itself, and pooled replications write both of all. Everything that is said
+about claims, in reports and on pages, is rendered from these two tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+
+from reproduction.claims.effects import NETWORKS, Against
+from reproduction.claims.verdicts import Verdict
+from synfeal.errors import InputError
+from synfeal.records.tables import (
+    COUNT,
+    LIMITLESS,
+    LIMITLESS_MAYBE,
+    MAYBE,
+    MAYBE_TEXT,
+    TEXT,
+    Kind,
+    read_frame,
+    write_frame,
+)
+
+EFFECTS, CLAIMS = "claim_effects.csv", "claims.csv"
+# Values of the column ``replication`` in rows that decide: of a single run, and of several.
+THIS_RUN, POOLED = "this run", "pooled"
+# Empty of batches and of speeds, which no test labels are needed for.
+AGAINST = Kind("str", optional=True)
+EFFECTS_SCHEMA = {
+    "claim": TEXT,
+    "part": TEXT,
+    "quantity": TEXT,
+    "against": AGAINST,
+    "replication": TEXT,
+    "value": LIMITLESS,
+    "low": LIMITLESS_MAYBE,
+    "high": LIMITLESS_MAYBE,
+    "printed": MAYBE,
+    "standard_error": MAYBE,
+    "unit": TEXT,
+}
+CLAIMS_SCHEMA = {
+    "claim": TEXT,
+    "against": AGAINST,
+    "verdict": TEXT,
+    "replications": COUNT,
+    "reason": MAYBE_TEXT,
+}
+PERCENT, SHARE, RATE = "percent", "share", "frames/s"
+# Claims that one thing is best have a row for each rival; the nearest one decides.
+BEST = "C12"
+REMEDY = "make the claims again"
+Row = Mapping[str, object]
+Keys = tuple[str, str]  # claim and what errors are against
+
+
+class Part(NamedTuple):
+    """A part of a claim, as it is shown.
+
+    Attributes:
+        claim: Id of the claim.
+        label: What is compared, and in which quantity.
+        quantity: Position or orientation, or what else is compared.
+        unit: ``percent`` (a change), ``share`` of batches, or ``frames/s``.
+        single: Values of the replications; empty for a single run.
+        decided: The value that decides, and its limits.
+        printed: The paper's; NaN where it has no such number.
+    """
+
+    claim: str
+    label: str
+    quantity: str
+    unit: str
+    single: tuple[float, ...]
+    decided: tuple[float, float, float]
+    printed: float
+
+
+class ClaimTables(NamedTuple):
+    """What is known about the claims.
+
+    Attributes:
+        effects: A row for each effect and replication, and one that decides.
+        verdicts: The verdict on each claim by its id and what errors are against.
+        reasons: Why a claim has no better verdict, by the same keys; empty where limits say it.
+    """
+
+    effects: pd.DataFrame
+    verdicts: dict[Keys, Verdict]
+    reasons: dict[Keys, str]
+
+    def verdict(self, claim: str, against: Against) -> tuple[Verdict, str] | None:
+        """Return a claim's verdict and its reason; None where it was not judged."""
+        for key in ((claim, against), (claim, "true"), (claim, "")):
+            if key in self.verdicts:
+                return self.verdicts[key], self.reasons[key]
+        return None
+
+
+def has_claims(folder: Path) -> bool:
+    """Tell whether a folder has both tables."""
+    return all((folder / name).is_file() for name in (EFFECTS, CLAIMS))
+
+
+def read_claims(folder: Path) -> ClaimTables:
+    """Read both tables.
+
+    Raises:
+        InputError: One cannot be read, or a verdict is none of those there are.
+    """
+    path = folder / CLAIMS
+    rows = read_frame(path, CLAIMS_SCHEMA, REMEDY)
+    for claim, verdict in zip(rows["claim"], rows["verdict"], strict=True):
+        if verdict not in [*Verdict]:
+            raise InputError(
+                f"{path}: claim '{claim}': verdict must be one of {', '.join(Verdict)}"
+            )
+    keys = list(zip(rows["claim"], rows["against"].fillna(""), strict=True))
+    return ClaimTables(
+        effects=read_frame(folder / EFFECTS, EFFECTS_SCHEMA, REMEDY),
+        verdicts=dict(zip(keys, map(Verdict, rows["verdict"]), strict=True)),
+        reasons=dict(zip(keys, rows["reason"].fillna(""), strict=True)),
+    )
+
+
+def write_claims(
+    folder: Path,
+    effects: Sequence[Row],
+    verdicts: Mapping[Keys, Verdict],
+    replications: int,
+    reasons: Mapping[Keys, str] | None = None,
+) -> None:
+    """Write both tables.
+
+    Args:
+        folder: Where to.
+        effects: Rows of ``claim_effects.csv``, by column.
+        verdicts: Verdicts by claim and what errors are against.
+        replications: How many they rest on.
+        reasons: Why they are not other ones, by the same keys.
+    """
+    write_frame(folder / EFFECTS, pd.DataFrame(effects, columns=list(EFFECTS_SCHEMA)), "%.6g")
+    judged = [
+        {
+            "claim": claim,
+            "against": against,
+            "verdict": verdict,
+            "replications": replications,
+            "reason": (reasons or {}).get((claim, against), ""),
+        }
+        for (claim, against), verdict in sorted(
+            verdicts.items(), key=lambda item: (int(item[0][0][1:]), item[0][1])
+        )
+    ]
+    write_frame(folder / CLAIMS, pd.DataFrame(judged, columns=list(CLAIMS_SCHEMA)))
+
+
+def parts_in(table: pd.DataFrame, against: Against = "true") -> list[Part]:
+    """List the parts of the claims, in the order of the claims.
+
+    Args:
+        table: ``claim_effects.csv``.
+        against: What errors are measured against, where a claim has both.
+    """
+    wanted = table[table["claim"] != NETWORKS]
+    both = wanted["claim"].isin(wanted.loc[wanted["against"] == "labels", "claim"])
+    wanted = wanted[~both | (wanted["against"] == against)]
+    found = [
+        _part(values) for _, values in wanted.groupby(["claim", "part", "quantity"], sort=False)
+    ]
+    best = [part for part in found if part.claim == BEST]
+    nearest = max(best, key=lambda part: part.decided[2], default=None)
+    kept = [part for part in found if part.claim != BEST or part is nearest]
+    return sorted(kept, key=lambda part: int(part.claim.removeprefix("C")))
+
+
+def _part(values: pd.DataFrame) -> Part:
+    """Gather a part of a claim from its rows, one of each replication and the one that decides."""
+    decides = values["replication"].isin((THIS_RUN, POOLED))
+    (row,) = values[decides].to_dict("records")
+    part, quantity, unit = (str(row[name]) for name in ("part", "quantity", "unit"))
+    return Part(
+        claim=str(row["claim"]),
+        label=f"{part}, {quantity}" if unit == PERCENT else part,
+        quantity=quantity,
+        unit=unit,
+        single=tuple(map(float, values.loc[~decides, "value"])),
+        decided=(float(row["value"]), float(row["low"]), float(row["high"])),
+        printed=float(row["printed"]),
+    )
