@@ -15,6 +15,7 @@ RUN := $(BIN)/synfeal run --cores $(CORES)
 SEVEN_SCENES ?=
 REAL_RESULTS ?= results/real
 SFM_LABELS ?=
+SEED ?= 101
 # A file of tests to a worker: their fixtures are made once, and a worker has one thread.
 PYTEST := OMP_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(CORES) --dist loadfile
 export PYTHONHASHSEED := 0
@@ -22,7 +23,7 @@ export PYTHONHASHSEED := 0
 # nothing of that is kept, and every job compiles a thousand modules again, half of its start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help reproduce smoke real start publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock wheels docs docs-links compile clean
+.PHONY: help reproduce smoke real start replicate publish archive plan test test-all test-slurm test-isolated coverage mutate check format lock wheels docs docs-links compile clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -41,6 +42,12 @@ real: $(INSTALLED)  ## from a scan to real photographs: SEVEN_SCENES=path of a 7
 start: $(INSTALLED)  ## train the backbones anew that pretrained runs start from (docs/start.md)
 	$(RUN) --profile start -- start
 	$(BIN)/python -m baselines.localizers.backbones.shipped results/start
+
+replicate: $(INSTALLED)  ## what is not archived yet of the replication with SEED, and its archive (docs/rules.md)
+	left=$$($(BIN)/python -m reproduction.replications remaining results/replication_$(SEED) --seed $(SEED)) \
+	  && { [ -z "$$left" ] || $(BIN)/snakemake --cores $(CORES) --configfile config/replication.yaml \
+	    --config seed=$(SEED) profile=replication_$(SEED) -- $$left; }
+	$(BIN)/python -m reproduction.replications archive results/replication_$(SEED) --seed $(SEED)
 
 publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and the pages' numbers from it
 	$(BIN)/python -m reproduction.report.publish --profile $(PROFILE)

@@ -74,7 +74,7 @@ def write_archive(root: Path, config: Config, out: Path) -> int:
                 (directory / name).write_text(text, encoding="utf-8")
         seconds.to_parquet(directory / SECONDS, index=False, compression="zstd")
         write_json(directory / PROVENANCE, made | {"earlier": earlier})
-    return len(_missing(design, out))
+    return len({run for _, run in _missing(design, out)})
 
 
 def remaining(config: Config, archive: Path) -> list[str]:

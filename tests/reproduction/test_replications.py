@@ -337,7 +337,7 @@ def test_a_replication_in_two_parts_is_that_in_one(papers, tmp_path):
     targets = remaining(night, archive)
     runs = [target for target in targets if target.endswith("/errors.csv")]
     assert all(f"/runs/{late}" in run for run in runs)
-    assert len(runs) == len({*runs}) <= missing
+    assert len(runs) == len({*runs}) == missing
     assert "labels" in targets
     # What says which path a test frame is of lies beside them, of every size of their scene alone.
     beside = [target for target in targets if target.endswith(("train.csv", "test.csv"))]
