@@ -216,9 +216,13 @@ def claims_beside_print(tables: ClaimTables) -> str:
 
 def part_label(part: Part) -> str:
     """Name a part of a claim."""
+    if part.unit == RATE:
+        return scene_title(part.label)
     if part.unit == SHARE:
         return SOURCES.get(part.label, part.label)
-    return scene_title(part.label) if part.unit == RATE else part.label
+    before, rival, after = part.label.partition(", not ")
+    name, comma, quantity = after.partition(",")
+    return f"{before}{rival}{SOURCES.get(name, name)}{comma}{quantity}"
 
 
 def part_text(part: Part) -> str:
