@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import pandas as pd
 from pydantic import Field, FiniteFloat, NonNegativeInt
-from scipy.stats import binomtest, kendalltau
+from scipy.stats import binomtest
 
 from reproduction.runs.results import read_result, shaped
 from reproduction.statistics.seeds import half_width
@@ -133,14 +133,6 @@ def share_limits(count: int, total: int, confidence: float = 0.95) -> tuple[floa
     """
     found = binomtest(count, total).proportion_ci(confidence, method="exact")
     return float(found.low), float(found.high)
-
-
-def kendall_tau(levels: Sequence[float], errors: Sequence[float]) -> float:
-    """Compute Kendall's tau-b of two series; NaN when all of one series is equal.
-
-    Ranks need no finite numbers: a failed run, of infinite error, is simply the worst.
-    """
-    return float(kendalltau(levels, errors).statistic)
 
 
 def _mean(runs: Sequence[Metrics], key: str) -> float | None:

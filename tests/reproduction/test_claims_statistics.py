@@ -5,10 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from scipy.stats import kendalltau
 
 from reproduction.claims.evidence import Cell, evidence_of
-from reproduction.statistics.limits import kendall_tau, share_limits, sign_test
+from reproduction.statistics.limits import share_limits, sign_test
 from synfeal.evaluation import bootstrap
 from synfeal.evaluation.bootstrap import (
     difference,
@@ -39,17 +38,6 @@ INF, NAN = math.inf, math.nan
 )
 def test_sign_test_by_counting_splits(changes, negative, counted, chance):
     assert sign_test(changes) == (negative, counted, pytest.approx(float(chance)))
-
-
-def test_kendall_tau_counts_pairs_as_scipys_does_and_ranks_a_failure_last():
-    assert kendall_tau([0, 1, 2, 3], [9, 5, 4, 1]) == pytest.approx(-1)
-    assert kendall_tau([0, 1, 2, 3], [1, 3, 2, 4]) == pytest.approx(4 / 6)  # 5 pairs for, 1 against
-    # One tie in the errors: (5 - 0) / sqrt(6 * 5).
-    assert kendall_tau([0, 1, 2, 3], [1, 2, 2, 4]) == pytest.approx(5 / math.sqrt(30))
-    errors = np.random.default_rng(3).normal(size=9).round(1)
-    assert kendall_tau(range(9), errors) == pytest.approx(kendalltau(range(9), errors).statistic)
-    assert kendall_tau([0, 1, 2, 3], [INF, 3, 2, 1]) == pytest.approx(-1)
-    assert math.isnan(kendall_tau([0, 1], [2.0, 2.0]))
 
 
 def test_share_limits_are_the_closed_form_at_the_ends():
