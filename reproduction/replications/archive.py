@@ -58,12 +58,11 @@ def write_archive(root: Path, config: Config, out: Path) -> int:
         How many of its trained localizers are not archived yet.
 
     Raises:
-        InputError: what lies in ``out`` was made with other settings, or the run has made nothing.
+        InputError: what lies in ``out`` was made with another seed, or the run has made nothing.
     """
     design = read_design(config)
-    settings = config_hash(config)
-    made = provenance(config.seed, settings)
-    earlier = _earlier_parts(out, settings)
+    made = provenance(config.seed, config_hash(config))
+    earlier = _earlier_parts(out, config.seed)
     errors = pd.concat(list(_errors_of(design, root, out)), ignore_index=True)
     tables = {name: _newest(root / "tables" / name, out / name) for name in LABEL_TABLES}
     seconds = _seconds(root, out)
@@ -210,14 +209,17 @@ def _errors_of(design: Design, root: Path, archive: Path) -> Iterator[pd.DataFra
         raise InputError(root, "has no trained localizer", "run its profile first")
 
 
-def _earlier_parts(archive: Path, settings: str) -> list[dict[str, Any]]:
-    """List the provenance of an archive and of what it was added to, oldest first."""
+def _earlier_parts(archive: Path, seed: int) -> list[dict[str, Any]]:
+    """List the provenance of an archive and of what it was added to, oldest first.
+
+    Each part names its commit and the hash of its settings.
+    """
     path = archive / PROVENANCE
     if not path.is_file():
         return []
     record = json.loads(read_text(path))
-    if record["config_sha256"] != settings:
-        raise InputError(archive, "was made with other settings", "remove it, or archive elsewhere")
+    if record["seed"] != seed:
+        raise InputError(archive, f"was made with seed {record['seed']}", "archive elsewhere")
     return [*record.pop("earlier"), record]
 
 

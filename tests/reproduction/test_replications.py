@@ -357,7 +357,7 @@ def test_a_replication_in_two_parts_is_that_in_one(papers, tmp_path):
     assert len(record["earlier"]) == 1
 
     other = night.model_copy(update={"seed": 7})
-    with pytest.raises(InputError, match="other settings"):
+    with pytest.raises(InputError, match="was made with seed 0"):
         write_archive(second, other, archive)
     with pytest.raises(InputError, match="no trained localizer"):
         write_archive(tmp_path / "nothing", night, tmp_path / "103")
