@@ -61,6 +61,11 @@ class Cell(NamedTuple):
     init: str = "pretrained"
 
 
+def cell_of(run: Run) -> Cell:
+    """Return the cell that a run is a repetition of."""
+    return Cell(run.model, run.scene, run.size, run.labels, run.init)
+
+
 class TestSet(NamedTuple):
     """The true poses of a test set, which resample draws which paths, and what is no learning."""
 
@@ -213,5 +218,5 @@ def evidence_of(design: Design, root: Path) -> Evidence:
     """Collect the results of a profile."""
     runs = defaultdict[Cell, list[Run]](list)
     for run in design.runs:
-        runs[Cell(run.model, run.scene, run.size, run.labels, run.init)].append(run)
+        runs[cell_of(run)].append(run)
     return Evidence(root, dict(runs), design.estimated)

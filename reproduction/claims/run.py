@@ -108,7 +108,7 @@ def write_run_claims(design: Design, root: Path) -> None:
 
 @dataclass(frozen=True)
 class RunClaims:
-    """What a run says about the claims: rows of effects, verdicts, and reasons for some."""
+    """Rows of effects of a run, its verdicts on the claims, and reasons for some."""
 
     rows: list[Row] = field(default_factory=list)
     verdicts: dict[Keys, Verdict] = field(default_factory=dict)

@@ -83,7 +83,7 @@ class Part(NamedTuple):
 
 
 class ClaimTables(NamedTuple):
-    """What is known about the claims.
+    """Effects that the claims assert, and verdicts on them.
 
     Attributes:
         effects: A row for each effect and replication, and one that decides.

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 
 from reproduction.claims.effects import OWN, Against
-from reproduction.claims.evidence import COMMON, SCORES, Cell, Evidence, evidence_of
+from reproduction.claims.evidence import COMMON, SCORES, Cell, Evidence, cell_of, evidence_of
 from reproduction.config.profile import Config
 from reproduction.design.experiments import Design, Run, read_design
 from reproduction.design.files import SPLITS, Files
@@ -63,7 +63,10 @@ def write_archive(root: Path, config: Config, out: Path) -> int:
     design = read_design(config)
     made = provenance(config.seed, config_hash(config))
     earlier = _earlier_parts(out, config.seed)
-    errors = pd.concat(list(_errors_of(design, root, out)), ignore_index=True)
+    parts = list(_errors_of(design, root, out))
+    if not parts:
+        raise InputError(root, "has no trained localizer", "run its profile first")
+    errors = pd.concat(parts, ignore_index=True)
     tables = {name: _newest(root / "tables" / name, out / name) for name in LABEL_TABLES}
     seconds = _seconds(root, out)
     with atomic_directory(out, replace=True) as directory:
@@ -172,11 +175,7 @@ def _wanted(design: Design) -> list[tuple[str, Run]]:
 
 def _missing(design: Design, archive: Path) -> list[tuple[str, Run]]:
     archived = _archived(archive)
-    return [(on, run) for on, run in _wanted(design) if (*_cell(run), on) not in archived]
-
-
-def _cell(run: Run) -> Cell:
-    return Cell(run.model, run.scene, run.size, run.labels, run.init)
+    return [(on, run) for on, run in _wanted(design) if (*cell_of(run), on) not in archived]
 
 
 def _archived(archive: Path) -> dict[tuple[str, ...], pd.DataFrame]:
@@ -194,19 +193,12 @@ def _errors_of(design: Design, root: Path, archive: Path) -> Iterator[pd.DataFra
     """Yield the rows of each finished run on each test set, or those that are archived."""
     evidence = evidence_of(design, root)
     archived = _archived(archive)
-    found = False
     for test_set, run in _wanted(design):
-        folder = root / "runs" / run.directory
-        finished = (folder / SCORES["labels"][0]).is_file()
-        if finished:
-            yield _rows(_cell(run), test_set, evidence, folder)
-        elif (*_cell(run), test_set) in archived:
-            yield archived[(*_cell(run), test_set)]
-        else:
-            continue
-        found = True
-    if not found:
-        raise InputError(root, "has no trained localizer", "run its profile first")
+        cell, folder = cell_of(run), root / "runs" / run.directory
+        if (folder / SCORES["labels"][0]).is_file():
+            yield _rows(cell, test_set, evidence, folder)
+        elif (*cell, test_set) in archived:
+            yield archived[(*cell, test_set)]
 
 
 def _earlier_parts(archive: Path, seed: int) -> list[dict[str, Any]]:

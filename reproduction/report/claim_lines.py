@@ -65,7 +65,7 @@ class Told(NamedTuple):
 
 
 class Topic(NamedTuple):
-    """What a line tells, and the effects that decide it."""
+    """Topic of a line, and the effects that decide it."""
 
     topic: str
     effects: tuple[Told, ...]

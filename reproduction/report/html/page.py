@@ -15,7 +15,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from PIL import Image
 
-from reproduction.claims.tables import ClaimTables, has_claims, read_claims
+from reproduction.claims.tables import CLAIMS, EFFECTS, ClaimTables, has_claims, read_claims
 from reproduction.claims.verdicts import Verdict
 from reproduction.config.tables import KEYS
 from reproduction.design.experiments import Design, Experiment
@@ -75,7 +75,7 @@ def data_address(path: Path) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
-CLAIMS, PROVENANCE = "claims.csv", "provenance.json"
+PROVENANCE = "provenance.json"
 # Beside the results of a profile may lie those of `make real`, which has no part in any profile.
 REAL = "real"
 HARD_CASES = (
@@ -109,7 +109,7 @@ def write_report(
     origin = read_origin(root / PROVENANCE) if (root / PROVENANCE).exists() else {}
     figures = figure_files(root / "figures", CAPTIONS)
     figures |= figure_files(root.with_name(REAL) / "figures", REAL_CAPTIONS)
-    files = (CLAIMS, PROVENANCE, *(f"tables/{name}.csv" for name in side_tables))
+    files = (CLAIMS, EFFECTS, PROVENANCE, *(f"tables/{name}.csv" for name in side_tables))
     page = render(
         "page.html",
         profile=root.name,
