@@ -72,8 +72,8 @@ COST_FLAGS = ("--profile", "--cores", "--measured", "--csv", "--compare")
 )
 def cost(arguments: argparse.Namespace) -> None:
     """Predict jobs, hours, memory and disk of a run of the workflow before it is started."""
-    from reproduction.plan.pace import PUBLISHED
     from reproduction.plan.plan import compare_text, plan_text
+    from reproduction.runs.published import MEASURED
 
     profile = arguments.profile or DEFAULT_PROFILE
     if arguments.gpu is not None:
@@ -85,7 +85,7 @@ def cost(arguments: argparse.Namespace) -> None:
                 raise InputError(f"--{option_name}: is of a plan on processors; leave out --gpu")
         print(gpu_text(read_profile(profile), arguments.gpu), end="")
         return
-    measured = arguments.measured or PUBLISHED
+    measured = arguments.measured or MEASURED
     if arguments.compare is not None:
         for option_name in ("profile", "cores"):
             if getattr(arguments, option_name) is not None:

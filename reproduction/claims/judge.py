@@ -33,8 +33,8 @@ class Condition(NamedTuple):
 
 
 def percent(log_ratio: float) -> float:
-    """Return the change in percent that a logarithm of a ratio stands for."""
-    return 100 * math.expm1(log_ratio) if log_ratio < 700 else math.inf
+    """Return the change in percent that a logarithm of a ratio stands for; none of no number."""
+    return math.inf if log_ratio >= 700 else 100 * math.expm1(log_ratio)
 
 
 def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:

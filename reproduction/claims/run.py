@@ -20,7 +20,7 @@ from baselines.config.learning import MODELS
 from reproduction.claims.effects import (
     ABOUT_LABELS,
     ABOUT_TRAINING,
-    NETWORKS,
+    DESCRIBED,
     RIVALS,
     SIZES,
     Against,
@@ -154,7 +154,7 @@ class RunErrors:
 
 
 def _judge_errors(found: RunClaims, evidence: Evidence, claim: str, against: Against) -> None:
-    """Judge a claim about localizers; describe the networks, which no claim is about."""
+    """Judge a claim about localizers; describe what no claim is about."""
     about_labels = claim in ABOUT_LABELS
     own = evidence.under(against if about_labels else COMMON)
     effects = (ABOUT_LABELS if about_labels else ABOUT_TRAINING)[claim]
@@ -164,7 +164,7 @@ def _judge_errors(found: RunClaims, evidence: Evidence, claim: str, against: Aga
             asserted = list(effects(RunErrors(own), against))
         unlearnt = own.not_learnt(LEARNT.get(claim, []))
     except Missing as missing:
-        if claim != NETWORKS:
+        if claim not in DESCRIBED:
             found.untested(keys, str(missing))
         return
     conditions = []
@@ -173,7 +173,7 @@ def _judge_errors(found: RunClaims, evidence: Evidence, claim: str, against: Aga
         of_sample = partial(limits, effect.sample, own.layout)
         conditions.append(Condition(effect.asked, effect.sign, of_sample, printed))
         found.rows.append(_effect_row(effect, of_sample(), printed))
-    if claim == NETWORKS:
+    if claim in DESCRIBED:
         return
     verdict = judge_best(conditions) if claim == BEST else judge(conditions)
     fewest = min(own.test_paths.values())

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from reproduction.claims.effects import NETWORKS, Against
+from reproduction.claims.effects import DESCRIBED, Against
 from reproduction.claims.verdicts import Verdict
 from synfeal.errors import InputError
 from synfeal.records.tables import (
@@ -55,6 +55,8 @@ CLAIMS_SCHEMA = {
 PERCENT, SHARE, RATE = "percent", "share", "frames/s"
 # Claims that one thing is best have a row for each rival; the nearest one decides.
 BEST = "C12"
+# Parts that are shown the other way round than they are judged, as the harm of what is there.
+SHOWN = {"no noise, not the most": "the most noise, not none"}
 REMEDY = "make the claims again"
 Row = Mapping[str, object]
 Keys = tuple[str, str]  # claim and what errors are against
@@ -168,7 +170,7 @@ def parts_in(table: pd.DataFrame, against: Against = "true") -> list[Part]:
         table: ``claim_effects.csv``.
         against: What errors are measured against, where a claim has both.
     """
-    wanted = table[table["claim"] != NETWORKS]
+    wanted = table[~table["claim"].isin(DESCRIBED)]
     both = wanted["claim"].isin(wanted.loc[wanted["against"] == "labels", "claim"])
     wanted = wanted[~both | (wanted["against"] == against)]
     found = [
@@ -184,13 +186,29 @@ def _part(values: pd.DataFrame) -> Part:
     """Gather a part of a claim from its rows, one of each replication and the one that decides."""
     decides = values["replication"].isin((THIS_RUN, POOLED))
     (row,) = values[decides].to_dict("records")
-    part, quantity, unit = (str(row[name]) for name in ("part", "quantity", "unit"))
-    return Part(
+    name, quantity, unit = (str(row[name]) for name in ("part", "quantity", "unit"))
+    shown = SHOWN.get(name, name)
+    part = Part(
         claim=str(row["claim"]),
-        label=f"{part}, {quantity}" if unit == PERCENT else part,
+        label=f"{shown}, {quantity}" if unit == PERCENT else shown,
         quantity=quantity,
         unit=unit,
         single=tuple(map(float, values.loc[~decides, "value"])),
         decided=(float(row["value"]), float(row["low"]), float(row["high"])),
         printed=float(row["printed"]),
     )
+    return part if shown == name else _turned(part)
+
+
+def _turned(part: Part) -> Part:
+    """Turn changes in percent round: the old value over the new one."""
+    value, low, high = part.decided
+    return part._replace(
+        single=tuple(map(_turned_percent, part.single)),
+        decided=(_turned_percent(value), _turned_percent(high), _turned_percent(low)),
+        printed=_turned_percent(part.printed),
+    )
+
+
+def _turned_percent(change: float) -> float:
+    return 100 / (1 + change / 100) - 100

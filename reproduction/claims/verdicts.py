@@ -94,6 +94,7 @@ class Claim:
     id: str  # ``C1`` to ``C16``
     section: str  # of the paper
     group: str  # of ``GROUPS``
+    title: str  # the claim in a few words
     statement: str  # the claim in our words
     published: str  # its figures, as printed
     numbers: tuple[float, ...]  # those of the figures that the test compares with

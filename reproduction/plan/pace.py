@@ -13,7 +13,6 @@ from reproduction.plan.jobs import jobs_of
 from reproduction.runs.job_times import read_measured
 from synfeal.errors import InputError
 
-PUBLISHED = (Path("results/published/mini"), Path("results/published/night"))
 # Largest over smallest job of a pace from which the difference tells its start from its work.
 LEAST_RATIO = 1.5
 

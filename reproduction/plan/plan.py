@@ -46,17 +46,6 @@ def plan_text(
     return "\n".join(_text(files, costs, measured) for costs in plans)
 
 
-def planned_cpu_s(profile: str, measured: Sequence[Path]) -> pd.Series[float]:
-    """Predict the processor seconds of a run, by rule.
-
-    Args:
-        profile: Its profile's name, or its file.
-        measured: Results of the runs it is predicted from.
-    """
-    rows = _by_rule(read_profile(profile), paces_of(map(read_run, measured)), cores=1)
-    return rows.set_index("name")["cpu_s"]
-
-
 def planned_tables(profile: str, measured: Sequence[Path], cores: int) -> pd.DataFrame:
     """Predict what a run costs that makes one of the tables alone, and begins with nothing.
 

@@ -17,8 +17,9 @@ from rich.text import Text
 
 from reproduction.design.files import Files
 from reproduction.plan.jobs import jobs_of
-from reproduction.plan.pace import PUBLISHED, paces_of, read_run, seconds_of
+from reproduction.plan.pace import paces_of, read_run, seconds_of
 from reproduction.plan.text import duration, number
+from reproduction.runs.published import MEASURED
 from synfeal.errors import InputError
 
 # So many expected seconds count as much as what was measured: the first short jobs, which mostly
@@ -31,7 +32,7 @@ BAR_CELLS, LOG_LINES, RULES_SHOWN = 20, 20, 2
 def seconds_by_rule(files: Files) -> dict[str, float]:
     """Predict what a job of each rule takes on average; empty where no run was published."""
     try:
-        paces = paces_of(map(read_run, PUBLISHED))
+        paces = paces_of(map(read_run, MEASURED))
     except InputError:
         return {}
     jobs = jobs_of(files)

@@ -20,11 +20,12 @@ from reproduction.config.load import parse_config
 from reproduction.config.profile import Config
 from reproduction.replications.archive import ERRORS, remaining, write_archive
 from reproduction.replications.pooling import write_pooled
+from reproduction.runs.published import PUBLISHED, REPLICATIONS
 from synfeal.config.load import merge, read_yaml
 from synfeal.errors import InputError, exit_status
 
 PROFILE = (Path("config/config.yaml"), Path("config/replication.yaml"))
-ARCHIVES = Path("results/published/replications")
+ARCHIVES = PUBLISHED / REPLICATIONS
 
 
 def main(argv: Sequence[str] | None = None) -> int:

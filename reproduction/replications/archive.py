@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -28,10 +28,12 @@ from reproduction.design.files import SPLITS, Files
 from reproduction.runs.job_times import read_measured
 from reproduction.runs.results import read_text
 from reproduction.statistics.limits import MEASURES, read_errors
+from reproduction.tables.label_error import SCHEMA as LABEL_ERROR_SCHEMA
 from synfeal.errors import InputError
 from synfeal.evaluation.bootstrap import Array, medians, path_counts
 from synfeal.records.files import atomic_directory, write_json
 from synfeal.records.provenance import config_hash, generator_of, provenance
+from synfeal.records.tables import read_frame
 
 ERRORS = "errors.parquet"
 LABEL_TABLES = ASSISTANCE, LABEL_ERROR = "assistance.csv", "label_error.csv"
@@ -135,6 +137,12 @@ class Archive:
     """One archived replication: a source of effects."""
 
     folder: Path
+    _samples: dict[tuple[str, ...], Array] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def cells(self) -> list[tuple[Cell, str]]:
+        """Cells and the test sets that they are archived on."""
+        return [(Cell(*key[:-1]), key[-1]) for key in self._groups]
 
     @cached_property
     def _groups(self) -> dict[tuple[str, ...], pd.DataFrame]:
@@ -142,6 +150,12 @@ class Archive:
 
     def log_errors(self, cell: Cell, test_set: str, against: Against) -> Array:
         """Sample over the test paths; cells on the same test set share the draws."""
+        key = (*cell, test_set, against)
+        if key not in self._samples:
+            self._samples[key] = self._sample(cell, test_set, against)
+        return self._samples[key]
+
+    def _sample(self, cell: Cell, test_set: str, against: Against) -> Array:
         rows = self._groups[(*cell, test_set)]
         _, place = np.unique(rows["path"], return_inverse=True)
         draw = generator_of("replication", cell.scene, test_set, cell.size * (test_set == OWN))
@@ -153,6 +167,13 @@ class Archive:
         with np.errstate(divide="ignore"):
             logs: Array = np.log(found)
         return logs
+
+    @cached_property
+    def label_errors(self) -> pd.DataFrame:
+        """Errors of the training labels, after assistance, of each label method."""
+        table = read_frame(self.folder / LABEL_ERROR, LABEL_ERROR_SCHEMA, "archive again")
+        own = (table["split"] == "train") & (table["assistance"] == "after")
+        return table[own].set_index("method")
 
     @cached_property
     def assistance(self) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Tables of the pooled replications: ``claim_effects.csv`` and ``claims.csv``."""
+"""Tables of the pooled replications: effects and verdicts, errors of networks and of labels."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from reproduction.claims.effects import (
-    NETWORKS,
+    DESCRIBED,
+    OWN,
     RIVALS,
     Against,
     Effect,
@@ -26,17 +27,31 @@ from reproduction.claims.judge import (
     judge_many,
     percent,
 )
-from reproduction.claims.run import KINECT_FUSION
+from reproduction.claims.levels import (
+    CELL_ERRORS,
+    CELLS_SCHEMA,
+    LABEL_ERRORS,
+    LABELS_SCHEMA,
+    UNITS,
+    limits_columns,
+)
+from reproduction.claims.run import KINECT_FUSION, NOT_JUDGED
 from reproduction.claims.tables import BEST, PERCENT, POOLED, SHARE, Keys, Row, write_claims
 from reproduction.claims.verdicts import Verdict
+from reproduction.replications.archive import UNITS as ARCHIVED_UNITS
 from reproduction.replications.archive import Archive
 from reproduction.statistics.pooled import Pooled, pool
 from reproduction.tables.assistance import PUBLISHED_ASSISTED, PUBLISHED_BATCHES
 from synfeal.errors import InputError
 from synfeal.evaluation.bootstrap import limits
+from synfeal.records.tables import frame_of, write_frame
 
-REPLICATIONS = "replications"  # folder of archives and pooled tables, among published runs
 Key = tuple[str, str, str, Against]
+# What replications cannot decide, and why.
+NOT_POOLED = NOT_JUDGED | {
+    "C14": (Verdict.NOT_TESTABLE, "replications share their machines with other programs")
+}
+SCALES = tuple(ARCHIVED_UNITS.values())  # archived units in a metre and in a degree
 
 
 class Part(NamedTuple):
@@ -68,7 +83,7 @@ def write_pooled(folders: Sequence[Path], out: Path) -> None:
 
     Args:
         folders: Archives, named by their seeds.
-        out: Directory to write both tables into. Changes are in percent, shares of batches are
+        out: Directory to write the tables into. Changes are in percent, shares of batches are
             shares; ``standard_error`` is that of the logarithm, of a ratio or of odds.
 
     Raises:
@@ -88,7 +103,7 @@ def write_pooled(folders: Sequence[Path], out: Path) -> None:
     verdicts: dict[Keys, Verdict] = {
         keys: judge_best(conditions) if keys[0] == BEST else judge(conditions)
         for keys, conditions in by_claim.items()
-        if keys[0] != NETWORKS
+        if keys[0] not in DESCRIBED
     }
     shares = {
         method: odds_of(
@@ -101,7 +116,38 @@ def write_pooled(folders: Sequence[Path], out: Path) -> None:
     verdicts["C4", ""] = judge_few({method: limits_of(shares[method]) for method in RIVALS})
     verdicts["C15", ""] = judge_many(limits_of(shares[KINECT_FUSION]))
     out.mkdir(parents=True, exist_ok=True)
-    write_claims(out, rows, verdicts, len(archives))
+    reasons = {(claim, ""): reason for claim, (_, reason) in NOT_POOLED.items()}
+    verdicts |= {(claim, ""): verdict for claim, (verdict, _) in NOT_POOLED.items()}
+    write_claims(out, rows, verdicts, len(archives), reasons)
+    sources = list(archives.values())
+    write_frame(out / CELL_ERRORS, frame_of(_cell_rows(sources), CELLS_SCHEMA), "%.6g")
+    write_frame(out / LABEL_ERRORS, frame_of(_label_rows(sources), LABELS_SCHEMA), "%.6g")
+
+
+def _cell_rows(archives: Sequence[Archive]) -> Iterator[Row]:
+    """Yield the median errors of each cell, pooled as logarithms."""
+    for cell, test_set in archives[0].cells:
+        scores: tuple[Against, ...] = ("labels", "true") if test_set == OWN else ("true",)
+        for against in scores:
+            samples = [archive.log_errors(cell, test_set, against) for archive in archives]
+            row: dict[str, object] = {**cell._asdict(), "test_set": test_set, "against": against}
+            quantities = zip(UNITS.values(), SCALES, zip(*samples, strict=True), strict=True)
+            for unit, scale, of_error in quantities:
+                pooled = pool([s[0] for s in of_error], [np.var(s[1:], ddof=1) for s in of_error])
+                row |= limits_columns(unit, *map(float, np.exp(pooled[:3]) / scale))
+            yield row | {"replications": len(archives)}
+
+
+def _label_rows(archives: Sequence[Archive]) -> Iterator[Row]:
+    """Yield how far off the training labels of each method are, pooled as logarithms."""
+    tables = [archive.label_errors for archive in archives]
+    for method in tables[0].index:
+        row: dict[str, object] = {"method": method}
+        for unit in UNITS.values():
+            logs = [math.log(table.loc[method, f"{unit}_median"]) for table in tables]
+            pooled = pool(logs, [0.0] * len(logs))  # all labels of a replication are counted
+            row |= limits_columns(unit, *map(float, np.exp(pooled[:3])))
+        yield row | {"replications": len(archives)}
 
 
 def _by_key(archives: Mapping[str, Archive]) -> dict[Key, list[Effect]]:

@@ -6,6 +6,7 @@ They tell a single run, by its own limits, as they tell pooled replications.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from statistics import mean
 from typing import NamedTuple
@@ -25,23 +26,28 @@ from reproduction.claims.tables import (
     Part,
     parts_in,
 )
-from reproduction.claims.verdicts import Verdict, published_claims
+from reproduction.claims.verdicts import SMALLEST, Verdict, published_claims
 from reproduction.report.intervals import Interval, change_text, percent, signed
 from reproduction.tables.layouts import SOURCES, TITLES, scene_title
 from reproduction.tables.sheet import markdown_table
 
-# How a line about claims with a verdict begins.
+# How a line about claims with a verdict begins. What is surely less than printed may be nothing:
+# then it is not seen.
+LESS, NOT_SEEN, UNDECIDED = "Smaller than printed", "Not seen", "Undecided"
 OUTCOMES = {
     Verdict.HOLDS: "Reproduced",
-    Verdict.SMALLER: "Smaller than printed",
-    Verdict.LESS: "Smaller than printed",
+    Verdict.SMALLER: LESS,
+    Verdict.LESS: LESS,
     Verdict.MIXED: "In part",
-    Verdict.NEGLIGIBLE: "Not seen",
+    Verdict.NEGLIGIBLE: NOT_SEEN,
     Verdict.OPPOSITE: "Not reproduced",
     Verdict.REFUTED: "Not reproduced",
-    Verdict.UNDECIDED: "Undecided",
+    Verdict.UNDECIDED: UNDECIDED,
     Verdict.NOT_LEARNT: "Not learnt at this scale",
 }
+
+
+RIVAL = "not "  # stands before what is compared with, in the names of parts
 
 
 class Told(NamedTuple):
@@ -119,6 +125,10 @@ TOPICS = (
 )
 
 
+# Claims that the lines are about.
+TOLD_CLAIMS = frozenset(told.claim for topic in TOPICS for told in topic.effects)
+
+
 def claim_lines(tables: ClaimTables) -> list[Line]:
     """Tell in a line each what was reproduced.
 
@@ -144,14 +154,25 @@ def _line(topic: Topic, tables: ClaimTables) -> Line | None:
     ]
     if not tested:
         return None
-    outcome = " / ".join(dict.fromkeys(outcome for _, outcome in tested))
-    told = "; ".join(f"{own.name}: {_changes(own, tables.effects)}" for own, _ in tested)
-    return Line(f"{outcome}: {topic.topic}", f"{told[0].upper()}{told[1:]}.")
+    changes = [_decided(own, tables.effects) for own, _ in tested]
+    spans = [span for both in changes for span, _ in both]
+    outcomes = dict.fromkeys(
+        NOT_SEEN if outcome == LESS and all(s.low <= 1 <= s.high for s in spans) else outcome
+        for _, outcome in tested
+    )
+    told = "; ".join(
+        f"{own.name}: {_changes(own, both)}" for (own, _), both in zip(tested, changes, strict=True)
+    )
+    open_text = ""
+    if [*outcomes] == [UNDECIDED] and not any(s.low <= 1 <= s.high for s in spans):
+        open_text = f" There is such an effect; that it is below {SMALLEST:.0f} % is not excluded."
+    text = f"{told[0].upper()}{told[1:]}.{open_text}"
+    return Line(f"{' / '.join(outcomes)}: {topic.topic}", text)
 
 
-def _changes(told: Told, table: pd.DataFrame) -> str:
-    """Format the changes of both errors with limits, and the paper's where it has them."""
-    texts, printed = [], []
+def _decided(told: Told, table: pd.DataFrame) -> list[tuple[Interval, float]]:
+    """Return the factors on both errors with limits, and the paper's, which may be no number."""
+    found = []
     for quantity in QUANTITIES:
         own = table[
             (table["claim"] == told.claim)
@@ -161,13 +182,19 @@ def _changes(told: Told, table: pd.DataFrame) -> str:
             & table["replication"].isin((THIS_RUN, POOLED))
         ]
         (row,) = own.to_dict("records")
-        ends = [1 + float(row[name]) / 100 for name in ("value", "low", "high")]
-        factors = [1 / ends[0], 1 / ends[2], 1 / ends[1]] if told.turned else ends
-        texts.append(f"{_change(*factors)} in {quantity}")
-        if told.in_print and math.isfinite(row["printed"]):
-            factor = 1 + float(row["printed"]) / 100
-            printed.append(change_text(1 / factor if told.turned else factor))
-    paper = f" (paper: {', '.join(printed)})" if printed else ""
+        names = ("value", "low", "high", "printed")
+        value, low, high, printed = (1 + float(row[name]) / 100 for name in names)
+        if told.turned:
+            value, low, high, printed = 1 / value, 1 / high, 1 / low, 1 / printed
+        found.append((Interval(value, low, high), printed))
+    return found
+
+
+def _changes(told: Told, both: Sequence[tuple[Interval, float]]) -> str:
+    """Format the changes of both errors with limits, and the paper's where it has them."""
+    texts = [f"{_change(*own)} in {q}" for q, (own, _) in zip(QUANTITIES, both, strict=True)]
+    printed = [change_text(of_paper) for _, of_paper in both if math.isfinite(of_paper)]
+    paper = f" (paper: {', '.join(printed)})" if printed and told.in_print else ""
     return f"{' and '.join(texts)}{paper}"
 
 
@@ -185,13 +212,24 @@ def _networks(table: pd.DataFrame) -> Line | None:
         ]
         span = f" ({signed(min(found))} to {signed(max(found))})" if len(found) > 1 else ""
         parts.append(f"{signed(mean(found))} in {quantity}{span}")
-    order = own[own["quantity"] == "position"].groupby("part")["value"].mean().sort_values()
-    best = TITLES[str(order.index[0])]
-    of_several = ", mean and range over the replications" if len(found) > 1 else ""
+    positions = own[own["quantity"] == "position"]
+    by_replication = [group.set_index("part") for _, group in positions.groupby("replication")]
+    (printed,) = {str(group["printed"].idxmin()) for group in by_replication}
+    best = Counter(str(group["value"].idxmin()) for group in by_replication)
+    agreeing = best[printed]
+    outcome = UNDECIDED
+    if agreeing in (0, len(found)):
+        outcome = OUTCOMES[Verdict.HOLDS if agreeing else Verdict.OPPOSITE]
+    several = len(found) > 1
+    names = ", ".join(
+        f"{TITLES[name]}'s{f' in {count} of {len(found)} replications' if several else ''}"
+        for name, count in best.most_common()
+    )
+    over = ", mean and range over the replications" if several else ""
     return Line(
-        "Which network is best",
-        f"Rank correlation with the paper among the five{of_several}: {', '.join(parts)}. The"
-        f" lowest position error is {best}'s.",
+        f"{outcome}: which network is best",
+        f"The lowest position error is {names} (paper: {TITLES[printed]}'s). Rank correlation with"
+        f" the paper among the five{over}: {', '.join(parts)}.",
     )
 
 
@@ -203,15 +241,25 @@ def claims_beside_print(tables: ClaimTables) -> str:
             "": claim.id,
             "Claim": claim.statement,
             "Printed": claim.published,
-            "Ours (95 % limits)": "; ".join(
-                f"{part_label(part)} {part_text(part)}" for part in parts if part.claim == claim.id
-            )
-            or "–",
-            "Verdict": _verdicts(claim.id, tables),
+            "Ours (95 % limits)": _effects([part for part in parts if part.claim == claim.id]),
+            "Verdict": _verdict_and_reason(claim.id, tables),
         }
         for claim in published_claims()
     ]
     return markdown_table(pd.DataFrame(rows))
+
+
+def _effects(parts: Sequence[Part]) -> str:
+    """Format the parts of a claim, both errors of one comparison together."""
+    by_name: dict[str, list[str]] = {}
+    for part in parts:
+        name, _, quantity = part_label(part).rpartition(", ")
+        if quantity in QUANTITIES:
+            by_name.setdefault(name, []).append(f"{quantity} {part_text(part)}")
+        else:
+            by_name[part_label(part)] = [part_text(part)]
+    texts = [f"{name}: {', '.join(texts)}" for name, texts in by_name.items()]
+    return "; ".join(texts) or "–"
 
 
 def part_label(part: Part) -> str:
@@ -220,9 +268,13 @@ def part_label(part: Part) -> str:
         return scene_title(part.label)
     if part.unit == SHARE:
         return SOURCES.get(part.label, part.label)
-    before, rival, after = part.label.partition(", not ")
-    name, comma, quantity = after.partition(",")
-    return f"{before}{rival}{SOURCES.get(name, name)}{comma}{quantity}"
+    if part.label.startswith(RIVAL):  # of the best of all
+        model, comma, cell = part.label.removeprefix(RIVAL).partition(",")
+        return f"than {TITLES[model]}{comma}{cell}"
+    new, against, after = part.label.partition(f", {RIVAL}")
+    old, comma, quantity = after.partition(",")
+    instead = " instead of " if against else ""
+    return f"{new}{instead}{SOURCES.get(old, old)}{comma}{quantity}"
 
 
 def part_text(part: Part) -> str:
@@ -245,8 +297,17 @@ def _change(value: float, low: float, high: float) -> str:
     return f"{change_text(value)} (no limits)"
 
 
-def _verdicts(claim: str, tables: ClaimTables) -> str:
+def verdicts_of(claim: str, tables: ClaimTables) -> str:
     """Name the verdicts against the labels and against the true poses, or the one they share."""
-    keys = [(claim, against) for against in ("labels", "true", "")]
-    found = [tables.verdicts[key] for key in keys if key in tables.verdicts]
-    return f"**{' / '.join(dict.fromkeys(found))}**" if found else "not judged"
+    keys = [key for key in _keys(claim) if key in tables.verdicts]
+    return " / ".join(dict.fromkeys(tables.verdicts[key] for key in keys)) or "not judged"
+
+
+def _verdict_and_reason(claim: str, tables: ClaimTables) -> str:
+    reasons = (tables.reasons.get(key, "") for key in _keys(claim))
+    said = "; ".join(dict.fromkeys(reason for reason in reasons if reason))
+    return f"**{verdicts_of(claim, tables)}**{f' ({said})' if said else ''}"
+
+
+def _keys(claim: str) -> list[tuple[str, str]]:
+    return [(claim, against) for against in ("labels", "true", "")]

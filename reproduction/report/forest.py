@@ -1,4 +1,4 @@
-"""Forest plot of the pooled replications: what is printed, each replication, and all together.
+"""Forest plot of the claims: what is printed, each replication, and all together.
 
     python -m reproduction.report.forest results/published/replications
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +18,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reproduction.claims.tables import PERCENT, SHARE, Part, parts_in, read_claims
+from reproduction.claims.verdicts import published_claims
 from reproduction.figures.style import BLUE, GREEN, VERMILION, Style
+from reproduction.report.claim_lines import part_label
 from reproduction.report.stamped import digest, stamped_png, write_stamped
 from synfeal.errors import exit_status
 
@@ -26,7 +28,7 @@ PICTURE = "claims.png"
 REMEDY = "pool the replications again: python -m reproduction.replications pool"
 COLORS = {"position": BLUE, "orientation": VERMILION}
 TICKS_PERCENT = (-80, -50, 0, 100, 300)
-ROW_INCHES = 0.27
+ROW_INCHES = 0.29
 
 
 class Forest(NamedTuple):
@@ -42,6 +44,12 @@ class Forest(NamedTuple):
     shares: list[Part]
     verdicts: dict[str, str]
 
+    def of_claims(self, claims: Collection[str]) -> Forest:
+        """Keep the changes of some claims alone."""
+        return self._replace(
+            changes=[part for part in self.changes if part.claim in claims], shares=[]
+        )
+
     @property
     def digest(self) -> str:
         """Hash of what is shown."""
@@ -50,10 +58,10 @@ class Forest(NamedTuple):
 
 
 def read_forest(folder: Path) -> Forest:
-    """Read the pooled effects of the claims, against the true poses, beside the paper's.
+    """Read the effects of the claims, against the true poses, beside the paper's.
 
     Args:
-        folder: Of the pooled tables.
+        folder: Of the tables of pooled replications, or of single runs.
 
     Raises:
         InputError: A table cannot be read.
@@ -68,16 +76,17 @@ def read_forest(folder: Path) -> Forest:
 
 
 def write_forest(forest: Forest, out_png: Path) -> None:
-    """Draw the pooled effects as PNG."""
+    """Draw the effects as PNG."""
     write_stamped(stamped_png(lambda: forest_figure(forest), forest.digest), out_png)
 
 
 def forest_figure(forest: Forest) -> Figure:
     """Draw a row for each part: replications as ticks, the pooled value with limits, print."""
     changes, shares, verdicts = forest
-    heights = [len(changes) + 1.5, len(shares) + 1.5]
-    figure = Figure(figsize=(9.5, ROW_INCHES * sum(heights) + 1.2), layout="constrained")
-    above, below = figure.subplots(2, 1, height_ratios=heights)
+    blocks = [rows for rows in (changes, shares) if rows]
+    heights = [len(rows) + 1.5 for rows in blocks]
+    figure = Figure(figsize=(9.5, ROW_INCHES * sum(heights) + 1.0), layout="constrained")
+    above, *below = figure.subplots(len(blocks), 1, height_ratios=heights, squeeze=False)[:, 0]
     _draw_rows(above, [_as_ratios(row) for row in changes])
     above.set_xscale("log")
     above.axvline(1, color="0.3", lw=0.8, zorder=0)
@@ -86,11 +95,12 @@ def forest_figure(forest: Forest) -> Figure:
         [f"{percent:+d} %".replace("-", "−") if percent else "0" for percent in TICKS_PERCENT],
     )
     above.minorticks_off()
-    above.set_xlabel("change (0: none; the axis is that of ratios)")
-    _draw_rows(below, shares)
-    below.set_xlim(0, 1)
-    below.set_xlabel("share of batches that needed assistance")
-    for axes, rows in ((above, changes), (below, shares)):
+    above.set_xlabel("change of the median error, on the scale of ratios")
+    for axes in below:
+        _draw_rows(axes, shares)
+        axes.set_xlim(0, 1)
+        axes.set_xlabel("share of batches that needed assistance")
+    for axes, rows in zip((above, *below), blocks, strict=True):
         _name_claims(axes, rows, verdicts)
     handles, titles = above.get_legend_handles_labels()
     shown = dict(zip(titles, handles, strict=True))
@@ -115,12 +125,13 @@ def _draw_rows(axes: Axes, rows: Sequence[Part]) -> None:
         axes.plot(row.single, [y] * len(row.single), "|", color=color, ms=7, mew=0.9, zorder=2)
         axes.plot([low, high], [y, y], color=color, lw=2.2, solid_capstyle="butt", zorder=2)
         name = row.quantity if row.quantity in COLORS else "other"
-        pooled: Style = {"color": color, "ms": 5.5, "mec": "white", "mew": 0.7, "zorder": 3}
-        axes.plot(value, y, "o", label=f"{name}, pooled", **pooled)
+        told = "pooled" if row.single else "ours"
+        decided: Style = {"color": color, "ms": 5.5, "mec": "white", "mew": 0.7, "zorder": 3}
+        axes.plot(value, y, "o", label=f"{name}, {told}", **decided)
         if math.isfinite(row.printed):
             printed: Style = {"mfc": "white", "mec": "0.25", "mew": 1.1, "ms": 5.5, "zorder": 4}
             axes.plot(row.printed, y, "D", label="the paper", **printed)
-    axes.set_yticks(range(len(rows)), [row.label for row in rows])
+    axes.set_yticks(range(len(rows)), [part_label(row) for row in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="x", color="0.92")
@@ -129,14 +140,15 @@ def _draw_rows(axes: Axes, rows: Sequence[Part]) -> None:
 
 def _name_claims(axes: Axes, rows: Sequence[Part], verdicts: dict[str, str]) -> None:
     """Write each claim with its verdict beside its first row, and rule a line above it."""
+    titles = {claim.id: claim.title for claim in published_claims()}
     before = None
     for y, row in enumerate(rows):
         if row.claim != before:
             axes.annotate(
-                f"{row.claim}: {verdicts.get(row.claim, 'not judged')}",
-                (1.01, y),
+                f"{row.claim}: {titles[row.claim]}\n{verdicts.get(row.claim, 'not judged')}",
+                (1.01, y - 0.3),
                 xycoords=("axes fraction", "data"),
-                va="center",
+                va="top",
                 fontsize=8,
                 annotation_clip=False,
             )

@@ -1,9 +1,7 @@
-"""Numbers of published tables with 95 % limits, and changes of errors between rows.
+"""Numbers of tables with 95 % limits, and how they are written.
 
-Published tables hold medians with limits, not the errors of single frames. So a change between two
-cells is given limits as if their test paths had nothing in common: too wide where both were tested
-on the same frames, never too narrow. Limits of published cells that were combined from several
-training runs by the normal distribution are widened to Student's t here.
+Limits of published cells that were combined from several training runs by the normal distribution
+are widened to Student's t here.
 """
 
 from __future__ import annotations
@@ -11,12 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-import pandas as pd
-
 from reproduction.statistics.limits import PATHS_AND_SEEDS
 from reproduction.statistics.seeds import borrowed_deviations, half_width
-from synfeal.records.tables import rows_of
 
 NORMAL_95 = 1.96  # what limits were combined with before `limits_of` was a column
 
@@ -27,10 +21,6 @@ class Interval(NamedTuple):
     value: float
     low: float
     high: float
-
-    def holds(self, number: float) -> bool:
-        """Tell whether a number lies within the limits."""
-        return self.low <= number <= self.high
 
     def __truediv__(self, other: Interval) -> Interval:
         """Divide as if both were independent and log-normal."""
@@ -63,23 +53,6 @@ def cell_interval(row: Any, measure: str) -> Interval:
         error, degrees = lent.relative_sd * value, float(lent.degrees_of_freedom)
     low, high = value - half_width(below, error, degrees), value + half_width(above, error, degrees)
     return Interval(value, low, high)
-
-
-def mean_change(before: pd.DataFrame, after: pd.DataFrame, measure: str) -> Interval:
-    """Compute the factor by which an error changes, geometric mean over the localizers.
-
-    What moves one localizer is taken to move all of them: limits do not shrink with their number.
-
-    Args:
-        before: Rows of tables 2 to 7, one per localizer.
-        after: Rows of the same localizers.
-        measure: Name of the error.
-    """
-    old = {row.model: cell_interval(row, measure) for row in rows_of(before)}
-    new = {row.model: cell_interval(row, measure) for row in rows_of(after)}
-    ratios = np.log([new[model] / old[model] for model in old])
-    value, low, high = np.exp(ratios.mean(axis=0))
-    return Interval(float(value), float(low), float(high))
 
 
 def change_text(factor: float) -> str:

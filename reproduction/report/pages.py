@@ -9,129 +9,92 @@ results of that profile; ``headline`` is the largest profile that is published.
 from __future__ import annotations
 
 import argparse
-import math
 import re
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
-from reproduction.claims.tables import has_claims, read_claims
+from reproduction.claims.tables import read_claims
 from reproduction.claims.verdicts import published_claims
 from reproduction.real.findings import real_findings, real_headline, real_short, real_table
-from reproduction.replications.pooling import REPLICATIONS
-from reproduction.report.claim_lines import as_markdown, claim_lines
-from reproduction.report.claims_table import claims_table
-from reproduction.report.effects_figure import effects_digest, effects_picture
-from reproduction.report.findings import (
-    CONTROLS,
-    MEASURES,
-    can_tell,
-    noise_changes,
-    read_table,
-    sentences,
-    short_sentences,
-    verdict_sentence,
+from reproduction.report.claim_changes import changes_since_single_runs
+from reproduction.report.claim_findings import claim_findings
+from reproduction.report.claim_lines import (
+    TOLD_CLAIMS,
+    as_markdown,
+    claim_lines,
+    claims_beside_print,
 )
+from reproduction.report.findings import Finding, can_tell, findings, sentences, short_sentences
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
 from reproduction.report.forest import read_forest, write_forest
-from reproduction.report.fresh import fresh_claims
-from reproduction.report.paper_cells import TABLES, paper_cells
+from reproduction.report.paper_cells import TABLES, best_known_cells, paper_cells
 from reproduction.report.paper_figure import cells_digest, paper_picture
 from reproduction.report.paper_tables import (
-    by_localizer,
     cells_beside_print,
+    label_quality,
     making,
     meshes_beside_print,
+    pooled_beside_print,
 )
-from reproduction.report.publish import PUBLISHED, RESULTS
-from reproduction.report.published_claims import (
-    claims_markdown,
-    read_published,
-    rows_now,
-    rules_note,
-)
-from reproduction.report.realisations import PAPER_FRAMES, realisations_table
-from reproduction.report.reproduced import effects, reproduced
-from reproduction.report.run_anew import run_anew, training_runs
+from reproduction.report.published import claims_folder, headline, read_table
 from reproduction.report.stamped import shows, write_stamped
+from reproduction.runs.published import PUBLISHED, REAL, REPLICATIONS
 from reproduction.runs.results import read_result
-from reproduction.tables.assistance import SCHEMA as ASSISTANCE
-from reproduction.tables.assistance import TOTAL
-from reproduction.tables.label_error import SCHEMA as LABEL_ERROR
 from reproduction.tables.layouts import SOURCES, scene_title
 from reproduction.tables.sheet import markdown_table
 from synfeal.errors import InputError, exit_status
 from synfeal.records.files import write_text
-from synfeal.records.tables import (
-    COUNT,
-    NUMBER,
-    TEXT,
-    read_frame,
-    records_of,
-    rows_of,
-)
+from synfeal.records.tables import COUNT, NUMBER, TEXT, read_frame, records_of
 
 PAGES = (
     Path("README.md"),
-    *map(Path, ("docs/results.md", "docs/runs.md", "docs/scenes.md")),
+    *map(Path, ("docs/results.md", "docs/scenes.md")),
     *(Path(f"docs/paper/table{number}.md") for number in range(1, 6)),
 )
 # Shows a run that needs photographs which are not ours to pass on: nothing until one is published.
-REAL_PAGE, REAL = Path("docs/real.md"), "real"
+REAL_PAGE = Path("docs/real.md")
 # Scores of what others published, which `make publish` does not make anew.
 OTHERS_POSES = Path("results/benchmarks/published_poses.csv")
+DIFFICULTY = Path("results/benchmarks/scene_difficulty")
 FIGURE = Path("docs/images/findings.png")
 PAPER_FIGURE = Path("docs/images/paper_against_ours.png")
-FOREST_FIGURE = Path("docs/images/claims.png")
-EFFECTS_FIGURE = Path("docs/images/effects.png")
-HEADLINES = ("night", "mini")
+# Every claim, and those of the lines that the read-me opens with.
+FOREST_FIGURE, EFFECTS_FIGURE = Path("docs/images/claims.png"), Path("docs/images/effects.png")
+PAPER_FRAMES = 6000  # of the smallest set of each room
 LIMITS_NOTE = (
-    "Brackets hold 95 % limits over test paths and training runs. The changes with label errors by"
-    " shape, with noise and with the size of the data set, and those of PoseNet2, have limits from"
-    " errors compared frame by frame, most of them as claims are judged ([this run's"
-    " claims](runs.md#claims-judged-by-the-first-run), [claims with fresh"
-    " seeds](runs.md#claims-judged-with-fresh-seeds)). Limits of other changes are computed as if"
-    " the two errors had been measured on different frames, which makes them wide."
+    "Brackets hold 95 % limits. Findings 1 to 3 are of one run, `night`, with limits over its test"
+    " paths and training runs; the others have the limits that claims are judged by."
 )
-NOISE_HEADINGS = {
-    "published": "published",
-    "labels": "against the labels",
-    "yardstick": "the yardstick alone",
-    "true": "against the true poses",
-}
 SIFT = dict.fromkeys(
     ("covered_share_mean", "covered_share_q10", "covered_share_q90", "keypoints_mean"), NUMBER
 )
 
 
-def headline() -> str:
-    """Return the profile whose results the read-me shows."""
-    return next((name for name in HEADLINES if (PUBLISHED / name).is_dir()), HEADLINES[-1])
-
-
-def findings(root: Path, top: str) -> str:
-    """Say what the run found, most important first, and how far its limits reach.
+def answer(root: Path, top: str) -> str:
+    """Say what was found, most important first, and how far its limits reach.
 
     Args:
-        root: Published results.
+        root: Published results of one run; claims are told by the folder beside it.
         top: Path from the page to the top of the repository, ending in a slash.
     """
-    if not can_tell(root):
-        return verdict_sentence(root)
-    found = sentences(root, f"{top}{root.as_posix()}")
-    items = "\n".join(f"{n}. {text}" for n, text in enumerate(found, start=1))
-    return f"{items}\n\n{LIMITS_NOTE}"
+    return f"{_numbered(sentences(_found(root), top))}\n\n{LIMITS_NOTE}"
 
 
 def found(root: Path) -> str:
-    """List what the run found, a sentence each."""
-    if not can_tell(root):
-        return verdict_sentence(root)
-    texts = short_sentences(root, root.as_posix())
+    """List what was found, a sentence each."""
+    return _numbered(short_sentences(_found(root)))
+
+
+def _found(root: Path) -> list[Finding]:
+    of_run = findings(root) if can_tell(root) else []
+    return [*of_run, *claim_findings(claims_folder(root.parent))]
+
+
+def _numbered(texts: Sequence[str]) -> str:
     return "\n".join(f"{n}. {text}" for n, text in enumerate(texts, start=1))
 
 
@@ -150,110 +113,50 @@ def origin(root: Path) -> str:
     )
 
 
-def size_table(root: Path) -> str:
-    """Format Table 4: errors against the true poses, published errors in brackets."""
-    cells = read_table(root, "table4_size")
-    frames = "(" + cells.n_train.astype(str) + ", " + cells.n_test.astype(str) + ")"
-    labels = cells.scene.map(scene_title) + " " + cells["size"] + " " + frames
-    return by_localizer(cells, "scene, size (frames here)", list(labels), _cell)
+def training_runs(cells: pd.DataFrame) -> str:
+    """Say how many training runs the cells of a table have, as in `3` or `1 to 3`."""
+    fewest, most = int(cells.n_seeds.min()), int(cells.n_seeds.max())
+    return str(fewest) if fewest == most else f"{fewest} to {most}"
 
 
-def labels_table(root: Path) -> str:
-    """Format Table 2, the same way."""
-    cells = read_table(root, "table2_ground_truth")
-    sources = [SOURCES.get(name, name) for name in cells.labels]
-    return by_localizer(cells, "labels from", sources, _cell)
-
-
-def noise_table(root: Path) -> str:
-    """Format Table 3 as changes from no noise, means over the localizers."""
-    rows = rows_of(noise_changes(root))
-    table = {"noise": [_noise_level(row) for row in rows]}
-    for score, heading in NOISE_HEADINGS.items():
-        position, orientation = (
-            [_change(getattr(row, f"{score}_{measure}")) for row in rows] for measure in MEASURES
-        )
-        table[heading] = [f"p {m}, o {deg}" for m, deg in zip(position, orientation, strict=True)]
-    return markdown_table(pd.DataFrame(table))
-
-
-def assistance(root: Path) -> str:
-    """Say which batches needed assistance, and how good the labels are."""
-    errors = read_table(root, "label_error", LABEL_ERROR)
-    errors = errors[errors.assistance == "after"]
-    position, orientation = 100 * errors.position_m_median, errors.orientation_deg_median
-    errors["text"] = position.map("{:.1f} cm, ".format) + orientation.map("{:.2f}°".format)
-    rms_cm, rms_deg = 100 * errors.position_m_rmse, errors.orientation_deg_rmse
-    errors["text"] += rms_cm.map("; {:.1f} cm, ".format) + rms_deg.map("{:.2f}°".format)
-    errors["text"] += (100 * (1 - errors.share_filled)).map("; {:.0f} %".format)
-    shown = errors.pivot(index=["scene", "method"], columns="split", values="text")
-    counts = read_table(root, "assistance", ASSISTANCE)
-    counts = counts[counts.split == TOTAL].join(shown, on=["scene", "method"])
-    published = [
-        ""
-        if pd.isna(row.published_assisted)
-        else f" *({row.published_assisted} of {row.published_batches})*"
-        for row in rows_of(counts)
-    ]
-    return markdown_table(
-        pd.DataFrame(
-            {
-                "scene": counts.scene.map(scene_title),
-                "labels from": counts.method.map(SOURCES),
-                "batches": counts.batches,
-                "assisted": counts.assisted.astype(str) + published,
-                "training: median; RMSE; registered": counts["train"],
-                "test: median; RMSE; registered": counts["test"],
-            }
-        )
-    )
-
-
-def claims(root: Path) -> str:
-    """Count verdicts, and list them under both scores, with the rules they were made by."""
-    rows = read_published(root)
-    listed = claims_markdown(rows_now(rows, root)).rstrip()
-    return f"{verdict_sentence(root)} {rules_note(rows, root)}\n\n{listed}"
-
-
-def difficulty(folder: Path = RESULTS / "benchmarks" / "scene_difficulty") -> str:
+def difficulty(folder: Path = DIFFICULTY) -> str:
     """Say how hard the scenes are for localization, a line for each that was measured."""
     names = sorted(path.name.removesuffix("-sift.csv") for path in folder.glob("*-sift.csv"))
     return markdown_table(pd.DataFrame([_difficulty(folder, name) for name in names]))
 
 
 def lines(root: Path) -> str:
-    """Tell what was reproduced: by the pooled replications, once there are any."""
-    replications = root.with_name(REPLICATIONS)
-    if has_claims(replications):
-        return as_markdown(claim_lines(read_claims(replications)))
-    return reproduced(root)
+    """Tell what was reproduced, by the effects of the claims."""
+    return as_markdown(claim_lines(read_claims(claims_folder(root.parent))))
 
 
 def verdicts(root: Path) -> str:
     """Tell each claim in a line, and what is unclear about it in print."""
     notes = [f"- {claim.id}: {claim.footnote}" for claim in published_claims() if claim.footnote]
-    return "\n".join([claims_table(root), "", *notes])
+    table = claims_beside_print(read_claims(claims_folder(root.parent)))
+    return "\n".join([table, "", *notes])
+
+
+def pooled(root: Path, name: str) -> str:
+    """Tell a table by the pooled replications, which lie beside the run; nothing before."""
+    return pooled_beside_print(root.with_name(REPLICATIONS), name)
 
 
 PAPERS = {name.partition("_")[0]: name for name in TABLES}  # `table2` to `table5`
 PARTS: dict[str, Callable[[Path], str]] = {
     "found": found,
     "reproduced": lines,
-    "answer": partial(findings, top="../"),
+    "answer": partial(answer, top="../"),
     "origin": origin,
-    "size": size_table,
-    "labels": labels_table,
-    "noise": noise_table,
-    "assistance": assistance,
-    "claims": claims,
-    "anew": run_anew,
     # Of all published runs together, whatever profile the mark names.
-    "fresh": lambda root: fresh_claims(root.parent),
-    "realisations": lambda root: realisations_table(root.parent),
     "verdicts": verdicts,
+    "changed": lambda root: changes_since_single_runs(root.parent),
+    "label_quality": lambda root: label_quality(claims_folder(root.parent)),
     "meshes": meshes_beside_print,
     **{part: partial(cells_beside_print, name=name) for part, name in PAPERS.items()},
+    **{
+        part.replace("table", "pooled"): partial(pooled, name=name) for part, name in PAPERS.items()
+    },
     **{part.replace("table", "cost"): partial(making, name=name) for part, name in PAPERS.items()},
     "difficulty": lambda root: difficulty(),
     "real": real_findings,
@@ -289,29 +192,7 @@ def part_of(name: str, profile: str) -> str:
     """
     if name not in PARTS:
         raise InputError(f"<!-- {name} {profile} -->: no such part; known: {', '.join(PARTS)}")
-    return PARTS[name](PUBLISHED / (headline() if profile == "headline" else profile))
-
-
-def _change(factor: float) -> str:
-    """Format a factor as a change in percent; the paper has none for rows of our own."""
-    return "–" if math.isnan(factor) else f"{round(100 * (factor - 1)):+d} %"
-
-
-def _noise_level(row: Any) -> str:
-    """Name a row of Table 3 by how far its labels were moved and turned."""
-    parts = {"position": f"{row.moved_m:.2f} m", "orientation": f"{row.noise_deg:g}°"}
-    return parts.get(row.block) or " and ".join(parts.values())
-
-
-def _cell(cell: Any) -> str:
-    """Format both errors in the paper's unit, positions as root mean squares over the axes."""
-    own = "failed"
-    if not pd.isna(cell.position_m_true):
-        position_rms_m = cell.position_m_true / math.sqrt(3)
-        own = f"{position_rms_m:.2f} m, {cell.orientation_deg_true:.1f}°"
-    if pd.isna(cell.published_position_m):  # a row the paper has not
-        return own
-    return f"{own} *({cell.published_position_m:.2f}, {cell.published_orientation_deg:.2f})*"
+    return PARTS[name](headline() if profile == "headline" else PUBLISHED / profile)
 
 
 def _difficulty(folder: Path, name: str) -> dict[str, str]:
@@ -340,20 +221,17 @@ def stale(check: bool) -> list[Path]:
         new = rewritten(old, part_of)
         if new != old:
             writers[page] = partial(write_text, page, new)
-    shown = PUBLISHED / headline()
+    shown = headline()
     drawn = panels(shown) if can_tell(shown) else []
     if drawn and not is_drawn_from(FIGURE, drawn):
         writers[FIGURE] = partial(write_findings_figure, drawn, FIGURE)
-    if has_claims(PUBLISHED / REPLICATIONS):
-        forest = read_forest(PUBLISHED / REPLICATIONS)
-        if not shows(FOREST_FIGURE, forest.digest):
-            writers[FOREST_FIGURE] = partial(write_forest, forest, FOREST_FIGURE)
-    if (PUBLISHED / CONTROLS).is_dir():
-        of_claims = effects(shown)
-        if not shows(EFFECTS_FIGURE, effects_digest(of_claims)):
-            content = effects_picture(of_claims)
-            writers[EFFECTS_FIGURE] = partial(write_stamped, content, EFFECTS_FIGURE)
-    cells = paper_cells(shown)
+    folder = claims_folder()
+    forest = read_forest(folder)
+    pictures = {FOREST_FIGURE: forest, EFFECTS_FIGURE: forest.of_claims(TOLD_CLAIMS)}
+    for picture, rows in pictures.items():
+        if not shows(picture, rows.digest):
+            writers[picture] = partial(write_forest, rows, picture)
+    cells = best_known_cells(shown, folder) if folder.name == REPLICATIONS else paper_cells(shown)
     if len(cells) and not shows(PAPER_FIGURE, cells_digest(cells)):
         content = paper_picture(cells)
         writers[PAPER_FIGURE] = partial(write_stamped, content, PAPER_FIGURE)

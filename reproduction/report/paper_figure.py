@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.config.learning import MODELS
-from reproduction.figures.style import MODEL_STYLES, set_log
+from reproduction.figures.style import MODEL_STYLES, Style, set_log
 from reproduction.report.paper_cells import ratios
 from reproduction.report.stamped import digest, stamped_png
 from reproduction.tables.layouts import TITLES
@@ -22,7 +22,7 @@ def cells_digest(cells: pd.DataFrame) -> str:
     """Hash the cells that the figure shows."""
     return digest(
         [
-            f"{row.table}|{row.row}|{row.model}|{row.quantity}|{row.printed:.6g}|{row.ours:.6g}"
+            f"{row.table}|{row.row}|{row.model}|{row.quantity}|{row.printed:.6g}|{row.ours:.6g}|{row.replications}"
             for row in rows_of(cells)
         ]
     )
@@ -38,7 +38,10 @@ def paper_picture(cells: pd.DataFrame) -> bytes:
 
 
 def paper_figure(cells: pd.DataFrame) -> Figure:
-    """Draw one axis per error: printed across, ours upwards, a mark per cell."""
+    """Draw one axis per error: printed across, ours upwards, a mark per cell.
+
+    Where some cells are pooled over replications, those of a single run are hollow.
+    """
     figure = Figure(figsize=(9.0, 4.9), layout="constrained")
     all_axes = figure.subplots(1, len(AXES))
     for axes, (quantity, label) in zip(all_axes, AXES.items(), strict=True):
@@ -65,10 +68,12 @@ def _title(model: str, times: Sequence[Mapping[str, float]]) -> str:
 def _draw(axes: Axes, cells: pd.DataFrame, label: str) -> None:
     for model in MODELS:
         own = cells[cells.model == model]
+        pooled = own.replications == cells.replications.max()
         style = {key: MODEL_STYLES[model][key] for key in ("color", "marker")}
-        axes.plot(
-            own.printed, own.ours, linestyle="", ms=5, mec="white", mew=0.4, **style, label=model
-        )
+        full: Style = {"linestyle": "", "ms": 5, "mec": "white", "mew": 0.4}
+        axes.plot(own.printed[pooled], own.ours[pooled], label=model, **full, **style)
+        hollow: Style = {"linestyle": "", "ms": 4, "mfc": "none", "mew": 0.8}
+        axes.plot(own.printed[~pooled], own.ours[~pooled], **hollow, **style)
     ends = [
         0.8 * cells[["printed", "ours"]].min().min(),
         1.25 * cells[["printed", "ours"]].max().max(),

@@ -11,10 +11,14 @@ from typing import Any
 import pandas as pd
 
 from baselines.config.learning import MODELS
+from reproduction.claims.levels import read_label_errors
+from reproduction.claims.tables import SHARE, Part, has_claims, parts_in, read_claims
 from reproduction.plan.plan import planned_tables
 from reproduction.plan.text import duration
-from reproduction.report.findings import read_table
-from reproduction.report.fresh import PLANNED_FROM
+from reproduction.report.claim_lines import part_text
+from reproduction.report.paper_cells import pooled_rows
+from reproduction.report.published import read_table
+from reproduction.runs.published import MEASURED
 from reproduction.tables.layouts import BLOCKS, TITLES, label_title, row_label, scene_title
 from reproduction.tables.meshes import FACTS
 from reproduction.tables.meshes import NAME as MESHES
@@ -29,6 +33,10 @@ HEADINGS = {
     "table5_from_scratch": "scene, size (frames here)",
 }
 CORES = 2
+POOLED_HEADING = (
+    "## Over {} replications\n\nGeometric means over rooms, paths, label sets and weights drawn"
+    " anew, with 95 % limits over replications *(printed values in brackets)*:"
+)
 
 
 def meshes_beside_print(root: Path) -> str:
@@ -53,6 +61,38 @@ def cells_beside_print(root: Path, name: str) -> str:
     cells = read_table(root, name)
     rows = [_row_title(name, cell) for cell in rows_of(cells)]
     return by_localizer(cells, HEADINGS[name], rows, _beside_print)
+
+
+def pooled_beside_print(folder: Path, name: str) -> str:
+    """Format the rows of one of Tables 2 to 5 that replications have, under a heading.
+
+    Args:
+        folder: Pooled tables.
+        name: Name of the table.
+
+    Returns:
+        Nothing where replications are not pooled yet.
+    """
+    if not has_claims(folder):
+        return ""
+    cells = pooled_rows(folder, name).dropna(subset=["replications"])
+    rows = [_row_title(name, cell) for cell in rows_of(cells)]
+    table = by_localizer(cells, HEADINGS[name], rows, _pooled_cell)
+    return f"{POOLED_HEADING.format(int(cells['replications'].max()))}\n\n{table}"
+
+
+def _pooled_cell(cell: Any) -> str:
+    """Format both errors with limits, positions as root mean squares over the axes."""
+    position_rms_m = (
+        getattr(cell, f"position_m{end}") / math.sqrt(3) for end in ("", "_low", "_high")
+    )
+    turned_deg = (getattr(cell, f"orientation_deg{end}") for end in ("", "_low", "_high"))
+    mark = "" if cell.flag == "none" else f", {cell.flag}"
+    return (
+        "{:.2f} m ({:.2f} – {:.2f}), ".format(*position_rms_m)
+        + "{:.1f}° ({:.1f} – {:.1f})".format(*turned_deg)
+        + f" *({cell.printed_position_m:.2f}, {cell.printed_orientation_deg:.2f}{mark})*"
+    )
 
 
 def by_localizer(
@@ -91,6 +131,32 @@ def _beside_print(cell: Any) -> str:
     return f"{ours} *({cell.published_position_m:.2f}, {cell.published_orientation_deg:.2f}{mark})*"
 
 
+def label_quality(folder: Path) -> str:
+    """Format how far off the training labels of each method are, and how often it was assisted.
+
+    Args:
+        folder: Effects of the claims, with the errors of labels.
+    """
+    assisted = {
+        part.label: f"{part_text(part)}{_printed_share(part)}"
+        for part in parts_in(read_claims(folder).effects)
+        if part.unit == SHARE
+    }
+    rows = [
+        {
+            "labels from": label_title(row.method),
+            "median error": f"{100 * row.position_m:.1f} cm, {row.orientation_deg:.2f}°",
+            "batches assisted (95 % limits)": assisted.get(row.method, "–"),
+        }
+        for row in rows_of(read_label_errors(folder))
+    ]
+    return markdown_table(pd.DataFrame(rows))
+
+
+def _printed_share(part: Part) -> str:
+    return "" if math.isnan(part.printed) else f" *({100 * part.printed:.0f} %)*"
+
+
 def making(root: Path, name: str) -> str:
     """Say how a table is made alone with the profile of a run, and what that takes.
 
@@ -109,5 +175,5 @@ def making(root: Path, name: str) -> str:
 
 @cache
 def _planned(profile: str) -> Mapping[str, Mapping[str, float]]:
-    found = planned_tables(profile, PLANNED_FROM, CORES).T.to_dict()
+    found = planned_tables(profile, MEASURED, CORES).T.to_dict()
     return {str(name): cost for name, cost in found.items()}

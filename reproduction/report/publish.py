@@ -15,12 +15,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from reproduction.report.html.provenance import hashes
+from reproduction.runs.published import PUBLISHED
 from reproduction.runs.results import read_result, read_text
 from synfeal.errors import InputError, exit_status
 from synfeal.records.files import atomic_directory
 
 RESULTS = Path("results")
-PUBLISHED = RESULTS / "published"
 FINISHED = ("claims.csv", "claim_effects.csv", "summary.md", "provenance.json", "benchmarks.csv")
 
 

@@ -71,6 +71,10 @@ def test_a_fall_is_judged_as_the_rise_of_its_sign_and_an_order_by_however_little
     assert verdict_of(effect(0.1, 3, asked="order")) == HOLDS
     assert verdict_of(effect(-3, -0.1, asked="order")) == OPPOSITE
     assert verdict_of(effect(-1, 1, asked="order")) == UNDECIDED
+    # Learning curves that do not fall have no distance along the images.
+    for sign in (1, -1):
+        unknown = Condition("size", sign, lambda _: (math.nan, math.nan), log_ratio(50))
+        assert verdict_of(unknown) == UNDECIDED
 
 
 def test_what_is_unknown_is_undecided_and_a_failure_is_the_worst():

@@ -11,7 +11,6 @@ from baselines.config.learning import MODELS
 from reproduction.config.load import load_config, parse_config
 from reproduction.design.docs import main
 from reproduction.design.experiments import Design, Run, read_design, read_experiments
-from reproduction.report.fresh import RUNS
 from synfeal.config.load import merge, read_yaml
 from synfeal.errors import InputError
 from synfeal.records.provenance import config_hash
@@ -165,52 +164,6 @@ def test_a_run_of_one_table_leaves_out_further_scenes_that_it_has_no_rows_of():
     wrong = {"estimation": estimation, "tables": ("table2_ground_truth",)}
     with pytest.raises(InputError, match="more_scenes: 'attic'"):
         read_design(config.model_copy(update=wrong))
-
-
-@pytest.mark.parametrize(
-    ("profile", "scene", "largest"),
-    [("controls", "large_room", "80k"), ("sanctuary", "sanctuary", "95k")],
-)
-def test_controls_show_small_sets_as_many_images_and_large_ones_every_frame_twice(
-    profile, scene, largest
-):
-    night, controls = (
-        load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml") for name in ("night", profile)
-    )
-    shown = controls.training.samples_seen
-    assert shown["6k"] == shown["20k"] == night.training.samples_seen[largest]
-    learnt = 1 - controls.training.validation_share
-    assert shown[largest] >= 2 * learnt * controls.n_frames(scene, largest, "train")
-    # Fresh seeds: nothing is drawn as in night.
-    design = read_design(controls)
-    assert all(run.seed(controls.seed) != run.seed(night.seed) for run in design.runs)
-    assert {row.scene for row in design.rows} == {scene}
-
-
-def test_no_two_fresh_runs_share_a_seed():
-    # Three are for no claim; replications have the seeds from 101 on.
-    names = [*(run.profile for run in RUNS), "shapes", "maps", "sanctuary_labels", "replication"]
-    seeds = [load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml").seed for name in names]
-    assert len({*seeds, 0}) == len(seeds) + 1
-
-
-def test_the_codes_dose_is_tried_on_nights_table_3_with_fresh_seeds():
-    night, dose = (
-        load_config(CONFIG / "config.yaml", CONFIG / f"{name}.yaml") for name in ("night", "dose")
-    )
-    assert (night.estimation.noise_dose, dose.estimation.noise_dose) == ("text", "code")
-    assert read_design(dose).rows == tuple(read_design(night).rows_of("table3_inconsistencies"))
-    assert read_design(dose).repetitions["default"] == 3
-    for part in ("scenes", "render", "network", "network_camera", "localizers"):
-        assert getattr(dose, part) == getattr(night, part), part
-    spread = {"test_paths": dose.collection.test_paths}  # the same frames to learn from
-    assert dose.collection == night.collection.model_copy(update=spread)
-    assert (dose.scale, dose.pretraining) == (night.scale, night.pretraining)
-    alike = {"repetitions": {}, "samples_seen": {}}
-    trainings = (c.training.model_copy(update=alike) for c in (night, dose))
-    assert len({training.model_dump_json() for training in trainings}) == 1
-    assert dose.training.samples_seen["6k"] == night.training.samples_seen["6k"]
-    assert (dose.seed, dose.root) != (night.seed, night.root)
 
 
 def test_a_dose_changes_what_a_profile_is_known_by():

@@ -14,15 +14,18 @@ import pandas as pd
 import pytest
 
 from reproduction.report import pages
-from reproduction.report.pages import PAGES, PARTS, headline, main, part_of, rewritten
-from reproduction.report.publish import FINISHED, PUBLISHED, publish
+from reproduction.report.pages import PAGES, PARTS, main, part_of, rewritten
+from reproduction.report.publish import FINISHED, publish
 from reproduction.report.publish import main as publish_main
+from reproduction.report.published import headline
+from reproduction.runs.published import PUBLISHED
 from synfeal.errors import InputError
 from tests.support.report_results import change_cell
 
 REPOSITORY = Path(__file__).parents[2]
 MINI = REPOSITORY / "results/published/mini"
 NIGHT = REPOSITORY / "results/published/night"
+SINGLE_RUNS = REPOSITORY / "results/published/single_runs"
 DIFFICULTY = "results/benchmarks/scene_difficulty"
 
 
@@ -31,6 +34,7 @@ def root(tmp_path, monkeypatch):
     """A copy of the published results of mini; the working directory is the top of the copy."""
     monkeypatch.chdir(tmp_path)
     shutil.copytree(MINI, tmp_path / PUBLISHED / "mini")
+    shutil.copytree(SINGLE_RUNS, tmp_path / PUBLISHED / "single_runs")
     shutil.copytree(REPOSITORY / "results/benchmarks/scene_difficulty", tmp_path / DIFFICULTY)
     return tmp_path / PUBLISHED / "mini"
 
@@ -60,15 +64,14 @@ def test_the_readme_tells_networks_of_the_papers_size_as_they_were_measured():
 
 def test_objections_are_met_with_numbers_of_the_tables():
     page = (REPOSITORY / "docs/objections.md").read_text()
-    lower = []
-    for run in ("labels", "night", "better_labels"):
-        cells = pd.read_csv(NIGHT.with_name(run) / "tables/table2_ground_truth.csv")
-        sfm, exact = (cells[cells.labels == n].set_index("model") for n in ("sfm", "synfeal"))
-        errors = ["position_m_true", "orientation_deg_true"]
-        lower.append(int((exact[errors] < sfm[errors]).to_numpy().sum()))
-    counts = "in {} of 10 columns of `labels`, in {} of 10 of `night` and of `better_labels`"
-    assert lower[1] == lower[2]
-    assert counts.format(*lower[:2]) in page
+    draws = pd.read_csv(SINGLE_RUNS / "label_draws.csv").set_index("run").columns_lower
+    assert draws["night"] == draws["better_labels"]
+    counts = "in {} of 10 columns of one single run, in {} of 10 of two others"
+    assert counts.format(draws["labels"], draws["night"]) in page
+    cells = pd.read_csv(NIGHT / "tables/table2_ground_truth.csv")
+    sfm, exact = (cells[cells.labels == n].set_index("model") for n in ("sfm", "synfeal"))
+    errors = ["position_m_true", "orientation_deg_true"]
+    assert (exact[errors] < sfm[errors]).to_numpy().sum() == draws["night"]
 
     passes = pd.read_csv(REPOSITORY / "results/benchmarks/passes.csv")
     posenet = passes[passes.localizer == "PoseNet"].pivot_table(
@@ -105,14 +108,21 @@ TABLES, SCENES = "published/mini/tables", "benchmarks/scene_difficulty"
 @pytest.mark.parametrize(
     ("part", "file", "column", "value", "shown"),
     [
-        ("size", f"{TABLES}/table4_size", "position_m_true", "7.654", "4.42 m"),  # over sqrt(3)
-        ("size", f"{TABLES}/table4_size", "published_position_m", "6.54", "*(6.54, "),
-        ("size", f"{TABLES}/table4_size", "position_m_true", "", "| failed *("),
+        ("table2", f"{TABLES}/table2_ground_truth", "orientation_deg", "99.87", "99.9°"),
         ("table4", f"{TABLES}/table4_size", "position_rms_m", "4.567", "4.57 m"),
+        ("table4", f"{TABLES}/table4_size", "published_position_m", "6.54", "*(6.54, "),
+        ("table4", f"{TABLES}/table4_size", "position_rms_m", "", "| failed *("),
         ("table5", f"{TABLES}/table5_from_scratch", "orientation_deg", "99.87", "99.9°"),
         ("table3", f"{TABLES}/table3_inconsistencies", "published_position_m", "6.54", "*(6.54, "),
         ("meshes", f"{TABLES}/table1_meshes", "vertices", "7654321", "| 7,654,321 *("),
-        ("labels", f"{TABLES}/table2_ground_truth", "orientation_deg_true", "99.87", "99.9°"),
+        ("label_quality", "published/single_runs/label_errors", "position_m", "0.999", "99.9 cm"),
+        (
+            "verdicts",
+            "published/single_runs/claims",
+            "verdict",
+            "opposite",
+            "opposite / negligible",
+        ),
         ("difficulty", f"{SCENES}/large_room-sift", "covered_share_mean", "0.99", "| 99 % ("),
         ("difficulty", f"{SCENES}/large_room-repetition", "far_share", "0.777", "77.7 %"),
     ],
@@ -121,21 +131,6 @@ def test_changing_a_result_changes_the_text(root, part, file, column, value, sho
     assert shown not in PARTS[part](root)
     change_cell(root.parent.parent / f"{file}.csv", column, value)
     assert shown in PARTS[part](root)
-
-
-def test_noise_is_told_as_changes_from_no_noise(root):
-    path = root / "tables/table3_inconsistencies.csv"
-    cells = pd.read_csv(path)
-    scores = ["position_m", "yardstick_position_m", "position_m_true", "published_position_m"]
-    cells.loc[cells.block == "position", [scores[0], *scores[2:]]] = 0.4  # without noise, too
-    most = (cells.block == "position") & (cells.noise_m == 0.3)
-    cells.loc[most, scores] = [0.5, 0.48, 0.44, 0.8]
-    cells.loc[most & (cells.model == "posenet2"), scores] = [0.6, 0.52, 0.40, 4.0]
-    cells.loc[most & (cells.model == "posenet2"), "published_flag"] = "misprint"
-    cells.to_csv(path, index=False)
-    told = next(line for line in PARTS["noise"](root).splitlines() if "| 0.30 m |" in line)
-    assert re.findall(r"p ([+-]\d+) %", told) == ["+100", "+30", "+22", "+8"]
-    assert "| 0.30 m and 20° |" in PARTS["noise"](root)
 
 
 def test_parts_are_replaced_and_nothing_else():
@@ -154,38 +149,42 @@ def test_a_part_without_an_end_is_refused():
 
 
 def test_the_headline_is_of_the_largest_profile_published(root):
-    assert headline() == "mini"
+    assert headline().name == "mini"
     shutil.copytree(root, root.with_name("night"))
-    change_cell(root.with_name("night") / "tables/table4_size.csv", "position_m_true", "7.654")
-    assert headline() == "night"
-    assert "4.42 m" in part_of("size", "headline")
-    assert "4.42 m" not in part_of("size", "mini")
+    change_cell(root.with_name("night") / "tables/table4_size.csv", "position_rms_m", "4.42")
+    assert headline().name == "night"
+    assert "4.42 m" in part_of("table4", "headline")
+    assert "4.42 m" not in part_of("table4", "mini")
 
 
 def test_unknown_parts_and_unpublished_results_are_input_errors(root):
-    planned = {name for name in PARTS if name.startswith("cost")}  # from its configuration
-    of_no_profile = {"difficulty", "fresh", "realisations"} | planned
-    for name in set(PARTS) - of_no_profile:
+    of_the_profile = {"origin", "meshes", "table2", "table3", "table4", "table5"}
+    of_photographs = {name for name in PARTS if name.startswith(("real", "photographs"))}
+    for name in of_the_profile | of_photographs:
         with pytest.raises(InputError, match="results/published/paper"):
             part_of(name, "paper")
+    shutil.rmtree(root.with_name("single_runs"))
+    for name in ("reproduced", "verdicts", "label_quality", "found"):
+        with pytest.raises(InputError, match="results/published/single_runs"):
+            part_of(name, "mini")
     with pytest.raises(InputError, match="<!-- sizes mini -->: no such part"):
         part_of("sizes", "mini")
 
 
-def test_a_run_without_the_tables_of_the_findings_tells_its_verdicts_alone(root):
+def test_a_run_without_the_tables_of_its_findings_leaves_those_of_the_claims(root):
     told = part_of("found", "mini")
-    assert "Of the paper's 16 claims" in told
-    assert "1." not in told.split("Of the paper")[0]
+    assert told.startswith("1. Noise in all labels")
+    assert "matched image features" not in told
 
 
 def test_check_writes_nothing_and_publishing_writes_all(root, capsys):
     shutil.copytree(NIGHT, root.with_name("night"))  # it has what the figure is drawn from
     for page in PAGES:
         page.parent.mkdir(exist_ok=True)
-        page.write_text("<!-- size headline --><!-- /size -->\n")
+        page.write_text("<!-- table4 headline --><!-- /table4 -->\n")
     assert main(["--check"]) == 1
     assert str(PAGES[0]) in capsys.readouterr().out
-    assert PAGES[0].read_text() == "<!-- size headline --><!-- /size -->\n"
+    assert PAGES[0].read_text() == "<!-- table4 headline --><!-- /table4 -->\n"
     assert not pages.FIGURE.exists()
     assert main([]) == 0
     assert "Large Room 6k" in PAGES[0].read_text()
@@ -297,13 +296,19 @@ def test_tracked_results_are_small_and_of_their_provenance():
     assert sum(p.stat().st_size for p in paths) <= LIMIT_MB * 1e6
 
 
+# Made later, from what was published of the run (docs/rules.md).
+LATER = {NIGHT / "tables/shape_changes.csv"}
+
+
 @pytest.mark.parametrize("profile", ["mini", "night"])
 def test_published_results_are_those_of_a_recorded_run(profile):
     finished = REPOSITORY / "results/published" / profile
     record = json.loads((finished / "provenance.json").read_text())
     assert len(record["commit"]) >= 40
     assert record["stages"]
-    paths = [finished / "claims.csv", finished / "summary.md", *(finished / "tables").glob("*.csv")]
-    for path in [*paths, *(finished / "figures").glob("*")]:
+    paths = {*(finished / "tables").glob("*.csv"), *(finished / "figures").glob("*")} - LATER
+    paths |= {p for p in (finished / "claims.csv", finished / "summary.md") if p.is_file()}
+    assert len(paths) > 8
+    for path in paths:
         sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
         assert record["files"][path.relative_to(finished).as_posix()] == sha256

@@ -2,19 +2,16 @@
 
 import csv
 import math
-import re
 from pathlib import Path
 
 import pytest
 
-from reproduction.report.effects_figure import effects_digest, effects_picture
-from reproduction.report.intervals import Interval
-from reproduction.report.paper_cells import paper_cells, rank_correlations, ratios
+from reproduction.claims.levels import CELLS_SCHEMA
+from reproduction.report.paper_cells import best_known_cells, paper_cells, pooled_cells, ratios
 from reproduction.report.paper_figure import cells_digest, paper_figure, paper_picture
-from reproduction.report.reproduced import effects, over_smaller, reproduced
 from reproduction.report.stamped import shows, write_stamped
 from reproduction.tables.layouts import TITLES
-from synfeal.errors import InputError
+from synfeal.records.tables import frame_of
 
 REPOSITORY = Path(__file__).parents[2]
 NIGHT = REPOSITORY / "results/published/night"
@@ -55,123 +52,68 @@ def test_every_printed_cell_is_there_and_no_misprint(cells, table, quantity):
         assert one[2] == pytest.approx(other[2], abs=2e-5)
 
 
-def ranks(values):
-    """Ranks from 1; equal values share the mean of theirs."""
-    return [
-        sum(other < value for other in values) + (1 + sum(other == value for other in values)) / 2
-        for value in values
-    ]
-
-
-def correlation(first, second):
-    """Pearson's correlation, by its definition."""
-    means = [sum(values) / len(values) for values in (first, second)]
-    apart = [
-        [value - mean for value in values]
-        for values, mean in zip((first, second), means, strict=True)
-    ]
-    norms = [math.sqrt(sum(value**2 for value in values)) for values in apart]
-    return sum(a * b for a, b in zip(*apart, strict=True)) / math.prod(norms)
-
-
-@pytest.mark.parametrize("quantity", [*OURS])
-def test_ranks_within_rows_and_within_networks(cells, quantity):
-    parts = {("scene", "size"): "row", ("model",): "model"}
-    for keys, within in parts.items():
-        found = rank_correlations(cells, quantity, within)
-        groups = {}
-        for row in rows("table4_size"):
-            groups.setdefault(tuple(row[key] for key in keys), []).append(row)
-        expected = [
-            correlation(
-                ranks([float(row[PAPER[quantity]]) for row in group]),
-                ranks([ours(row, quantity) for row in group]),
-            )
-            for group in groups.values()
-        ]
-        assert found == pytest.approx(expected, abs=1e-9)
-
-
-def test_orders_that_agree_and_orders_that_are_reversed(cells):
+def test_ratios_are_geometric_means_over_table_4(cells):
     sizes = cells[(cells.table == "table4_size") & (cells.quantity == "position")]
-    same = sizes.assign(ours=3 * sizes.printed)
-    reverse = sizes.assign(ours=1 / sizes.printed)
-    for within, count in (("row", 8), ("model", 5)):
-        assert rank_correlations(same, "position", within) == pytest.approx([1] * count)
-        assert rank_correlations(reverse, "position", within) == pytest.approx([-1] * count)
-    assert list(ratios(same, "position").values()) == pytest.approx([3] * 5)
+    assert list(ratios(sizes.assign(ours=3 * sizes.printed), "position").values()) == (
+        pytest.approx([3] * 5)
+    )
+    own = [row for row in rows("table4_size") if row["model"] == "posenet"]
+    found = [ours(row, "position") / float(row[PAPER["position"]]) for row in own]
+    assert ratios(cells, "position")["posenet"] == pytest.approx(
+        math.prod(found) ** (1 / len(found)), rel=1e-4
+    )
 
 
-def test_the_line_on_networks_says_what_the_cells_say(cells):
-    line = reproduced(NIGHT).splitlines()[2].replace("−", "-")
-    orders, turns = (rank_correlations(cells, quantity, "row") for quantity in OURS)
-    within = [sum(values) / len(values) for values in (orders, turns)]
-    assert [float(n) for n in re.findall(r"[+-]\d\.\d\d", line)] == [round(n, 2) for n in within]
-    assert f"over the {len(orders)} rows" in line
-    assert f"negative in {sum(order < 0 for order in orders)} rows" in line
+@pytest.fixture
+def pooled(tmp_path):
+    """Errors of three cells over five replications: of Table 2, Table 3 and Table 4."""
+    same = {"scene": "large_room", "size": "6k", "init": "pretrained", "replications": 5}
+    errors = [
+        {"labels": "sfm", "test_set": "own", "against": "labels", "position_m": 0.3},
+        {"labels": "sfm", "test_set": "own", "against": "true", "position_m": 9},
+        {"labels": "noise-p0.3-r20", "test_set": "own", "against": "labels", "position_m": 0.6},
+        {"labels": "synfeal", "test_set": "common", "against": "true", "position_m": 0.9},
+    ]
+    rows = [
+        {**same, "model": "posenet", "orientation_deg": 10, **error}
+        | {f"{unit}_{end}": 1 for unit in ("position_m", "orientation_deg") for end in ENDS}
+        for error in errors
+    ]
+    frame_of(rows, CELLS_SCHEMA).to_csv(tmp_path / "cell_errors.csv", index=False)
+    return tmp_path
 
 
-def claim(run, name):
-    with NIGHT.with_name(run).joinpath("claims.csv").open(newline="") as lines:
-        return next(row for row in csv.DictReader(lines) if row["id"] == name)
+ENDS = ("low", "high")
 
 
-def percents(text):
-    """Percentages of a text in order, without those in brackets."""
-    return [float(n) for n in re.findall(r"([+-][\d.]+) %", re.sub(r"\(.*?\)", "", text))]
-
-
-@pytest.mark.parametrize("place", range(5))
-def test_effects_are_those_that_claims_were_judged_by(place):
-    effect = effects(NIGHT)[place]
-    row = claim(effect.run, effect.claim)
-    values, ends = (percents(row[f"{of}_{effect.against}"])[:4] for of in ("measured", "interval"))
-    paper = [float(n) for n in re.findall(r"([+-]?\d+) %", row["published"])]
-    if effect.claim == "C6":  # told as shares of the error with noise
-        values, ends, paper = (
-            [100 * (1 / (1 - n / 100) - 1) for n in own] for own in (values, ends, paper)
-        )
-    found = [100 * (change.value - 1) for change in effect.ours]
-    assert found == pytest.approx(values[:2], abs=1e-6)
-    limits = [100 * (end - 1) for change in effect.ours for end in (change.low, change.high)]
-    assert limits == pytest.approx(ends, abs=1e-6)
-    if effect.paper is None:
-        assert (effect.claim, effect.against) == ("C6", "true")
-    else:
-        assert [100 * (factor - 1) for factor in effect.paper] == pytest.approx(paper)
-
-
-def test_a_quarter_of_the_larger_is_a_third_of_the_smaller():
-    assert over_smaller(Interval(1.25, 1.2, 1.5)) == pytest.approx((4 / 3, 1.25, 2))
-
-
-def test_the_noise_of_the_paper_is_that_of_its_table():
-    """Table 3: PoseNet2 without noise and with 0.30 m and 20°, both errors."""
-    (noise,) = (one for one in effects(NIGHT) if (one.claim, one.against) == ("C6", "labels"))
-    cells = [row for row in rows("table3_inconsistencies") if row["model"] == "posenet2"]
-    of = {row["noise_m"]: row for row in cells if row["block"] == "both"}
-    for factor, name in zip(noise.paper, PAPER.values(), strict=True):
-        printed = float(of["0.3"][name]) / float(of["0"][name])
-        assert factor == pytest.approx(printed, rel=0.03)  # the paper rounds to whole percents
-
-
-def test_a_picture_of_effects_shows_these_effects_and_no_others(tmp_path):
-    found = effects(NIGHT)
-    out = tmp_path / "effects.png"
-    write_stamped(effects_picture(found), out)
-    assert shows(out, effects_digest(found))
-    assert not shows(out, effects_digest(found[:4]))
-
-
-def test_a_run_that_the_lines_need_is_named_where_it_is_missing(tmp_path):
-    (tmp_path / "night").symlink_to(NIGHT)
-    with pytest.raises(InputError, match=r"controls"):
-        reproduced(tmp_path / "night")
+def test_cells_of_replications_stand_beside_the_printed_ones(pooled, cells):
+    found = pooled_cells(pooled).query("quantity == 'position'").set_index("table")
+    assert len(found) == 3
+    # Printed: PoseNet's first cells of Tables 2 and 4, and its last of Table 3.
+    expected = {
+        "table2_ground_truth": (0.34, 0.3),
+        "table3_inconsistencies": (0.50, 0.6),
+        "table4_size": (0.29, 0.9),
+    }
+    for table, (printed, distance_m) in expected.items():
+        assert found.printed[table] == printed
+        assert found.ours[table] == pytest.approx(distance_m / math.sqrt(3))
+    together = best_known_cells(NIGHT, pooled)
+    assert len(together) == len(cells)
+    assert (together.replications == 5).sum() == 6
+    own = together[(together.replications == 5) & (together.table == "table4_size")]
+    assert set(own.ours.round(4)) == {round(0.9 / math.sqrt(3), 4), 10}
+    figure = paper_figure(together)
+    marks = [line for axes in figure.axes for line in axes.lines if line.get_linestyle() == "None"]
+    full = [line for line in marks if line.get_markerfacecolor() != "none"]
+    assert sum(len(line.get_xdata()) for line in full) == 6
+    assert sum(len(line.get_xdata()) for line in marks) == len(together)
 
 
 def test_the_figure_has_a_mark_for_every_cell_and_knows_what_it_shows(cells, tmp_path):
     axes = paper_figure(cells).axes
-    assert sum(len(line.get_xdata()) for one in axes for line in one.lines[:5]) == len(cells)
+    marks = [line for one in axes for line in one.lines if line.get_linestyle() == "None"]
+    assert sum(len(line.get_xdata()) for line in marks) == len(cells)
     out = tmp_path / "paper.png"
     write_stamped(paper_picture(cells), out)
     assert shows(out, cells_digest(cells))

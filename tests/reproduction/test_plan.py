@@ -10,15 +10,16 @@ import pytest
 from baselines.training.memory import training_mb
 from reproduction.design.profiles import read_profile
 from reproduction.plan.jobs import jobs_of
-from reproduction.plan.pace import PUBLISHED, paces_of, read_run, seconds_of
+from reproduction.plan.pace import paces_of, read_run, seconds_of
 from reproduction.runs.job_times import last_look_s, read_measured, write_measured
+from reproduction.runs.published import MEASURED
 from synfeal.cli import main
 from tests import ROOT
 from tests.support.dry_run import measured_jobs
 from tests.support.report_results import read
 
 HEADER = "s\tmax_rss\tcpu_time\n"
-MINI, NIGHT = PUBLISHED
+MINI, NIGHT = MEASURED
 SMOKE = Path("results/benchmarks/smoke")
 
 
@@ -157,7 +158,7 @@ def test_a_rule_that_no_run_measured_is_said_to_be_and_left_out(tmp_path, capsys
     assert "unknown" not in total
 
 
-@pytest.mark.parametrize("root", PUBLISHED, ids=str)
+@pytest.mark.parametrize("root", MEASURED, ids=str)
 def test_training_asks_for_more_memory_than_any_published_run_took(root):
     config = read_profile(root.name).config
     files = read_profile(root.name)

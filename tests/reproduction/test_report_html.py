@@ -115,7 +115,10 @@ def test_claims_carry_both_scores_escaped_and_no_unknown_verdict(finished, root)
     html = claims_table(read_claims(finished))
     labels = re.findall(r'<div class="labels">(.*?)</div>', html)
     true = re.findall(r'<div class="true">(.*?)</div>', html)
-    both = "exact labels, not SfM, position: {0};<br>exact labels, not SfM, orientation: {0}"
+    both = "<br>".join(
+        f"exact labels instead of SfM, {name}: {{0}}" + ";" * (name == "position")
+        for name in ("position", "orientation")
+    )
     assert labels[0] == both.format("−42 % (−50 to −9 %)")
     assert true[0] == both.format("−34 % (−44 to +3 %)")
     assert text_of(labels[1]) == "✓ holds"

@@ -6,11 +6,15 @@ import numpy as np
 import trimesh
 from PIL import Image
 
+from reproduction.claims.evidence import QUANTITIES
+from reproduction.claims.label_shapes import NAME, SCHEMA
 from reproduction.claims.tables import PERCENT, THIS_RUN, write_claims
 from reproduction.claims.verdicts import Verdict
+from reproduction.design.shapes import SHAPES
 from synfeal.dataset.pose_table import PoseTable, write_pose_table
 from synfeal.mesh.model import MeshPart, TexturedMesh
 from synfeal.mesh.save import save_glb
+from synfeal.records.tables import frame_of
 from tests.support.report_results import (
     CONFIG,
     METHODS_RUN,
@@ -36,6 +40,7 @@ def page_results(root):
     """Known scores and claims, two figures, one scene; other tables as a run published them."""
     complete_results(root)
     write_known_claims(root)
+    write_shape_changes(root)
     for name in SIDE_TABLES:
         shutil.copy(PUBLISHED / "tables" / f"{name}.csv", root / "tables")
     shutil.copy(PUBLISHED / "provenance.json", root)
@@ -56,6 +61,17 @@ def write_known_claims(root):
         verdicts["C2", against] = Verdict(verdict)
     verdicts["C15", ""] = Verdict.NOT_TESTABLE
     write_claims(root, rows, verdicts, 1, {("C15", ""): UNTESTED, ("C2", "true"): "stays <short>"})
+
+
+def write_shape_changes(root):
+    """What label errors of each shape change; those that bend space do the most harm."""
+    rows = [
+        {"change": shape, "error": error, "percent": 10 * harm}
+        | {"percent_low": 10 * harm - 4, "percent_high": 10 * harm + 4}
+        for harm, shape in enumerate(SHAPES, start=1)
+        for error in QUANTITIES
+    ]
+    frame_of(rows, SCHEMA).to_csv(root / "tables" / f"{NAME}.csv", index=False)
 
 
 def write_scene(root):

@@ -22,7 +22,7 @@ from reproduction.design.experiments import Design, Experiment
 from reproduction.design.side_tables import SIDE_TABLES
 from reproduction.figures.registry import CAPTIONS
 from reproduction.report.claim_lines import claim_lines
-from reproduction.report.findings import OF_ANY_RUN, can_tell, findings
+from reproduction.report.findings import can_tell, findings
 from reproduction.report.findings_figure import panels, picture
 from reproduction.report.html.provenance import cost_sentence, origin_html, read_origin
 from reproduction.report.html.tables import (
@@ -159,9 +159,11 @@ def found_in(root: Path, claims: ClaimTables | None) -> list[dict[str, str]]:
         {"headline": f"{line.outcome}.", "evidence": line.numbers, "table": "claims-table"}
         for line in lines
     ]
-    for finding in findings(root, OF_ANY_RUN) if can_tell(root) else []:
+    for finding in findings(root) if can_tell(root) else []:
         evidence = f"{finding.evidence} Measured against {finding.against}."
-        told.append({"headline": finding.headline, "evidence": evidence, "table": finding.table})
+        told.append(
+            {"headline": finding.headline, "evidence": evidence, "table": finding.source.stem}
+        )
     return told
 
 

@@ -1,0 +1,15 @@
+"""Names of published results; this is the one place that has them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+PUBLISHED = Path("results/published")
+# Of the first that is published pages show tables that replications do not repeat: one run.
+HEADLINES = ("night", "mini")
+# Whose jobs those of other profiles are predicted from.
+MEASURED = (PUBLISHED / "mini", PUBLISHED / "night")
+# Scores of photographs, which need recordings that are not ours to pass on.
+REAL = "real"
+# Archives and pooled tables; before all are pooled, the single runs that each decided claims.
+REPLICATIONS, SINGLE_RUNS = "replications", "single_runs"
