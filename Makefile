@@ -44,9 +44,12 @@ start: $(INSTALLED)  ## train the backbones anew that pretrained runs start from
 	$(BIN)/python -m baselines.localizers.backbones.shipped results/start
 
 replicate: $(INSTALLED)  ## what is not archived yet of the replication with SEED, and its archive (docs/rules.md)
-	left=$$($(BIN)/python -m reproduction.replications remaining results/replication_$(SEED) --seed $(SEED)) \
-	  && { [ -z "$$left" ] || $(BIN)/snakemake --cores $(CORES) --configfile config/replication.yaml \
-	    --config seed=$(SEED) profile=replication_$(SEED) -- $$left; }
+	set -e; for labels in exact estimated; do \
+	  left=$$($(BIN)/python -m reproduction.replications remaining results/replication_$(SEED) --seed $(SEED) \
+	    --labels $$labels); \
+	  [ -z "$$left" ] || $(BIN)/snakemake --cores $(CORES) --configfile config/replication.yaml \
+	    --config seed=$(SEED) profile=replication_$(SEED) -- $$left; \
+	done
 	$(BIN)/python -m reproduction.replications archive results/replication_$(SEED) --seed $(SEED)
 
 publish: $(INSTALLED)  ## track what PROFILE's run made (results/published), and the pages' numbers from it

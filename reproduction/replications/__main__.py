@@ -42,6 +42,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         command.add_argument("root", type=Path, help="its results")
         command.add_argument("--seed", type=int, required=True, help="its seed")
     pool = commands.add_parser("pool", help="pool all archives")
+    rest.add_argument(
+        "--labels",
+        choices=("exact", "estimated"),
+        help="only rows whose labels are exact, noise put in or not, or only the others",
+    )
     for command in (archive, rest, pool):
         command.add_argument("--archives", type=Path, default=ARCHIVES, help="where they lie")
     arguments = parser.parse_args(argv)
@@ -58,7 +63,8 @@ def _run(arguments: argparse.Namespace) -> None:
     config = _profile(arguments.seed, arguments.root.name)
     archive = arguments.archives / str(arguments.seed)
     if arguments.command == "remaining":
-        print(*remaining(config, archive), sep="\n")
+        estimated = arguments.labels and arguments.labels == "estimated"
+        print(*remaining(config, archive, estimated), sep="\n")
         return
     missing = write_archive(arguments.root, config, archive)
     print(f"{archive}: {missing} localizers remain" if missing else f"{archive}: whole")

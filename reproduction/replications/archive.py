@@ -32,7 +32,7 @@ from reproduction.tables.label_error import SCHEMA as LABEL_ERROR_SCHEMA
 from synfeal.errors import InputError
 from synfeal.evaluation.bootstrap import Array, medians, path_counts
 from synfeal.records.files import atomic_directory, write_json
-from synfeal.records.provenance import config_hash, generator_of, provenance
+from synfeal.records.provenance import config_hash, generator_of, git_commit, provenance
 from synfeal.records.tables import read_frame
 
 ERRORS = "errors.parquet"
@@ -63,7 +63,7 @@ def write_archive(root: Path, config: Config, out: Path) -> int:
         InputError: what lies in ``out`` was made with another seed, or the run has made nothing.
     """
     design = read_design(config)
-    made = provenance(config.seed, config_hash(config))
+    made = provenance(config.seed, config_hash(config)) | {"commit_of_run": git_commit(root)}
     earlier = _earlier_parts(out, config.seed)
     parts = list(_errors_of(design, root, out))
     if not parts:
@@ -81,26 +81,32 @@ def write_archive(root: Path, config: Config, out: Path) -> int:
     return len({run for _, run in _missing(design, out)})
 
 
-def remaining(config: Config, archive: Path) -> list[str]:
+def remaining(config: Config, archive: Path, estimated: bool | None = None) -> list[str]:
     """List the Snakemake targets that a replication still needs.
 
     Args:
         config: Its profile, with its seed.
         archive: Its archive; need not exist.
+        estimated: Only what needs estimated labels, or only what needs none; None for all. Labels
+            take long and are not archived, so that a machine whose time may end makes them last.
 
     Returns:
         Errors of each localizer that is not archived, with what places their test frames on paths,
         and the rule of the label tables. Nothing where the archive is whole.
     """
     design = read_design(config)
-    runs = sorted({run for _, run in _missing(design, archive)})
+    methods = {method for _, _, method in design.estimated}
+    runs = sorted(
+        {run for _, run in _missing(design, archive) if estimated in (None, run.labels in methods)}
+    )
     scenes = {run.scene for run in runs}
     targets = [f"{config.root}/runs/{run.directory}/errors.csv" for run in runs]
     for scene, size in Files(config, design).sizes:
         if scene in scenes:
             folder = f"{config.root}/labels/{scene}/{size}/synfeal"
             targets += [f"{folder}/{split}.csv" for split in SPLITS]
-    if not all((archive / name).is_file() for name in LABEL_TABLES):
+    tables = all((archive / name).is_file() for name in LABEL_TABLES)
+    if not tables and estimated is not False:
         targets.append("labels")
     return targets
 

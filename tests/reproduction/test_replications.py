@@ -501,3 +501,22 @@ def test_an_unfinished_archive_is_not_pooled(tmp_path, capsys):
     # Five networks in 19 cells: 8 label sets, 4 further sizes, 3 from scratch, 4 of fewer images.
     assert sum(target.endswith("/errors.csv") for target in targets) == 95
     assert {target.split("/")[1] for target in targets if "/" in target} == {"of_it"}
+    # What needs no label method first: its labels would have to be estimated again elsewhere.
+    parts = []
+    for labels in ("exact", "estimated"):
+        asked = ["remaining", "results/of_it", "--seed", "103", "--labels", labels, *archives]
+        assert replications(asked) == 0
+        parts.append(
+            {
+                t
+                for t in capsys.readouterr().out.split()
+                if not t.endswith(("train.csv", "test.csv"))
+            }
+        )
+    exact, estimated = parts
+    assert exact | estimated == {t for t in targets if not t.endswith(("train.csv", "test.csv"))}
+    assert not exact & estimated
+    methods = {target.split("/")[5] for target in estimated - {"labels"}}
+    assert methods == {*RIVALS, "kinect-fusion"}
+    assert "labels" in estimated
+    assert len(exact) == 75
