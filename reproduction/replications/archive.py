@@ -63,7 +63,8 @@ def write_archive(root: Path, config: Config, out: Path) -> int:
         InputError: what lies in ``out`` was made with another seed, or the run has made nothing.
     """
     design = read_design(config)
-    made = provenance(config.seed, config_hash(config)) | {"commit_of_run": git_commit(root.resolve().parent)}
+    made = provenance(config.seed, config_hash(config))
+    made["commit_of_run"] = git_commit(root.resolve().parent)
     earlier = _earlier_parts(out, config.seed)
     parts = list(_errors_of(design, root, out))
     if not parts:
