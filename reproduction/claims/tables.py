@@ -6,6 +6,7 @@ about claims, in reports and on pages, is rendered from these two tables.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -204,11 +205,13 @@ def _turned(part: Part) -> Part:
     """Turn changes in percent round: the old value over the new one."""
     value, low, high = part.decided
     return part._replace(
-        single=tuple(map(_turned_percent, part.single)),
-        decided=(_turned_percent(value), _turned_percent(high), _turned_percent(low)),
-        printed=_turned_percent(part.printed),
+        single=tuple(map(turned_percent, part.single)),
+        decided=(turned_percent(value), turned_percent(high), turned_percent(low)),
+        printed=turned_percent(part.printed),
     )
 
 
-def _turned_percent(change: float) -> float:
-    return 100 / (1 + change / 100) - 100
+def turned_percent(change: float) -> float:
+    """Turn a change in percent round: what fell to nothing is infinitely more the other way."""
+    factor = 1 + change / 100
+    return math.inf if factor == 0 else 100 / factor - 100

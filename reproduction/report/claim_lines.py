@@ -25,6 +25,7 @@ from reproduction.claims.tables import (
     ClaimTables,
     Part,
     parts_in,
+    turned_percent,
 )
 from reproduction.claims.verdicts import SMALLEST, Verdict, published_claims
 from reproduction.report.intervals import Interval, change_text, percent, signed
@@ -183,9 +184,11 @@ def _decided(told: Told, table: pd.DataFrame) -> list[tuple[Interval, float]]:
         ]
         (row,) = own.to_dict("records")
         names = ("value", "low", "high", "printed")
-        value, low, high, printed = (1 + float(row[name]) / 100 for name in names)
+        percents = [float(row[name]) for name in names]
         if told.turned:
-            value, low, high, printed = 1 / value, 1 / high, 1 / low, 1 / printed
+            value, low, high, printed = map(turned_percent, percents)
+            percents = [value, high, low, printed]
+        value, low, high, printed = (1 + number / 100 for number in percents)
         found.append((Interval(value, low, high), printed))
     return found
 

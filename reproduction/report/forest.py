@@ -76,8 +76,13 @@ def read_forest(folder: Path) -> Forest:
 
 
 def write_forest(forest: Forest, out_png: Path) -> None:
+    """Draw the effects into a file, as PNG."""
+    write_stamped(forest_picture(forest), out_png)
+
+
+def forest_picture(forest: Forest) -> bytes:
     """Draw the effects as PNG."""
-    write_stamped(stamped_png(lambda: forest_figure(forest), forest.digest), out_png)
+    return stamped_png(lambda: forest_figure(forest), forest.digest)
 
 
 def forest_figure(forest: Forest) -> Figure:

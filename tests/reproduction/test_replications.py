@@ -259,6 +259,20 @@ def test_the_line_on_networks_counts_replications(pooled, tmp_path, networks, be
     assert f"The lowest position error is {names} (paper: PoseNet2's)." in line
 
 
+def test_a_network_that_noise_makes_fail_is_told_as_one(pooled, tmp_path):
+    for name in (EFFECTS, CLAIMS):
+        shutil.copy(pooled / name, tmp_path / name)
+    effects = pd.read_csv(tmp_path / EFFECTS)
+    own = (effects.claim == "C6") & (effects.quantity == "position")
+    effects.loc[own, ["value", "low", "high"]] = [-100.0, -100.0, math.inf]
+    effects.to_csv(tmp_path / EFFECTS, index=False)
+    assert "unknown in position" in lines_of(tmp_path)[1]
+    assert "the most noise instead of none: position unknown" in claims_beside_print(
+        read_claims(tmp_path)
+    )
+    assert main([str(tmp_path)]) == 0  # the figure
+
+
 @pytest.mark.parametrize(("low", "said"), [(2.0, True), (-2.0, False)])
 def test_an_effect_that_is_sure_but_small_is_told_as_one(pooled, tmp_path, low, said):
     for name in (EFFECTS, CLAIMS):

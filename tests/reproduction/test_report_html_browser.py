@@ -116,7 +116,8 @@ def test_nothing_is_requested_and_nothing_sticks_out(page, tmp_path):
     requested, overhang, images = asked(page, tmp_path, probe)
     assert requested == []
     assert overhang <= 0
-    assert images == [True] * 4  # the paper beside ours, the findings, and two figures
+    # The paper beside ours, cells and effects; the findings; and two figures.
+    assert images == [True] * 5
 
 
 def test_paths_are_cut_where_their_number_changes_and_trajectories_those_of_the_files(page):

@@ -21,9 +21,10 @@ from reproduction.config.tables import KEYS
 from reproduction.design.experiments import Design, Experiment
 from reproduction.design.side_tables import SIDE_TABLES
 from reproduction.figures.registry import CAPTIONS
-from reproduction.report.claim_lines import claim_lines
+from reproduction.report.claim_lines import TOLD_CLAIMS, claim_lines
 from reproduction.report.findings import can_tell, findings
 from reproduction.report.findings_figure import panels, picture
+from reproduction.report.forest import forest_picture, read_forest
 from reproduction.report.html.provenance import cost_sentence, origin_html, read_origin
 from reproduction.report.html.tables import (
     claims_table,
@@ -178,7 +179,7 @@ def untested(claims: ClaimTables) -> list[str]:
 
 
 def opening(root: Path) -> list[dict[str, str]]:
-    """Draw what a report opens with, as ``data:`` addresses: the paper beside ours, the findings.
+    """Draw what a report opens with, as ``data:`` addresses: the paper beside ours, what was found.
 
     A picture whose rows the run lacks is left out.
     """
@@ -186,6 +187,11 @@ def opening(root: Path) -> list[dict[str, str]]:
     pictures = {}
     if len(cells):
         pictures["Every cell of Tables 2 to 5, printed against ours"] = paper_picture(cells)
+    forest = read_forest(root).of_claims(TOLD_CLAIMS) if has_claims(root) else None
+    if forest and forest.changes:
+        pictures["Effects that the paper's claims are about: print and ours"] = forest_picture(
+            forest
+        )
     drawn = panels(root) if can_tell(root) else []
     if drawn:
         title = "Feature matching against regression, and errors of labels by their shape"
