@@ -16,10 +16,10 @@ from reproduction.claims.tables import REMEDY
 from synfeal.records.tables import COUNT, LIMITLESS, LIMITLESS_MAYBE, TEXT, read_frame
 
 CELL_ERRORS, LABEL_ERRORS = "cell_errors.csv", "label_errors.csv"
-UNITS = {"position": "position_m", "orientation": "orientation_deg"}
+UNITS = ("position_m", "orientation_deg")
 ERRORS = {
     f"{unit}{end}": kind
-    for unit in UNITS.values()
+    for unit in UNITS
     for end, kind in {"": LIMITLESS, "_low": LIMITLESS_MAYBE, "_high": LIMITLESS_MAYBE}.items()
 }
 CELLS_SCHEMA = {

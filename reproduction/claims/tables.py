@@ -7,9 +7,9 @@ about claims, in reports and on pages, is rendered from these two tables.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -162,6 +162,26 @@ def write_claims(
         )
     ]
     write_frame(folder / CLAIMS, pd.DataFrame(judged, columns=list(CLAIMS_SCHEMA)))
+
+
+def deciding_rows(
+    effects: pd.DataFrame, claim: str, part: str, against: Against
+) -> dict[str, Mapping[Hashable, Any]]:
+    """Select the rows that decide a part of a claim, by quantity.
+
+    Args:
+        effects: ``claim_effects.csv``.
+        claim: Id of the claim, or what is described beside them.
+        part: Part of the claim.
+        against: What errors are measured against.
+    """
+    own = effects[
+        (effects["claim"] == claim)
+        & (effects["part"] == part)
+        & (effects["against"] == against)
+        & effects["replication"].isin((THIS_RUN, POOLED))
+    ]
+    return {row["quantity"]: row for row in own.to_dict("records")}
 
 
 def parts_in(table: pd.DataFrame, against: Against = "true") -> list[Part]:

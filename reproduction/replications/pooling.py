@@ -131,7 +131,7 @@ def _cell_rows(archives: Sequence[Archive]) -> Iterator[Row]:
         for against in scores:
             samples = [archive.log_errors(cell, test_set, against) for archive in archives]
             row: dict[str, object] = {**cell._asdict(), "test_set": test_set, "against": against}
-            quantities = zip(UNITS.values(), SCALES, zip(*samples, strict=True), strict=True)
+            quantities = zip(UNITS, SCALES, zip(*samples, strict=True), strict=True)
             for unit, scale, of_error in quantities:
                 pooled = pool([s[0] for s in of_error], [np.var(s[1:], ddof=1) for s in of_error])
                 row |= limits_columns(unit, *map(float, np.exp(pooled[:3]) / scale))
@@ -143,7 +143,7 @@ def _label_rows(archives: Sequence[Archive]) -> Iterator[Row]:
     tables = [archive.label_errors for archive in archives]
     for method in tables[0].index:
         row: dict[str, object] = {"method": method}
-        for unit in UNITS.values():
+        for unit in UNITS:
             logs = [math.log(table.loc[method, f"{unit}_median"]) for table in tables]
             pooled = pool(logs, [0.0] * len(logs))  # all labels of a replication are counted
             row |= limits_columns(unit, *map(float, np.exp(pooled[:3])))

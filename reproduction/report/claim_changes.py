@@ -1,4 +1,4 @@
-"""What pooled replications changed in the verdicts that single runs had given."""
+"""Tell which verdicts of single runs the pooled replications changed."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from baselines.labels.methods import SIMULATOR
 from reproduction.claims.effects import IMAGES, OWN, RIVALS, Against
 from reproduction.claims.evidence import QUANTITIES
 from reproduction.claims.levels import LABEL_ERRORS, read_cell_errors, read_label_errors
-from reproduction.claims.tables import EFFECTS, POOLED, THIS_RUN, read_claims
+from reproduction.claims.tables import EFFECTS, deciding_rows, read_claims
 from reproduction.report.findings import ROOM, SMALL, Finding
 from reproduction.report.intervals import Interval, change_text, percent
 
@@ -29,12 +29,12 @@ def claim_findings(folder: Path) -> list[Finding]:
 
 
 def effect_of(
-    folder: Path, claim: str, part: str, against: Against = "true"
+    effects: pd.DataFrame, claim: str, part: str, against: Against = "true"
 ) -> tuple[Interval, Interval] | None:
     """Return the factors on both errors that decide a part of a claim.
 
     Args:
-        folder: Effects and verdicts.
+        effects: ``claim_effects.csv``.
         claim: Id of the claim, or what is described beside them.
         part: Part of the claim.
         against: What errors are measured against.
@@ -42,14 +42,7 @@ def effect_of(
     Returns:
         Factors on the position and the orientation error; None where there is no such part.
     """
-    table = read_claims(folder).effects
-    own = table[
-        (table["claim"] == claim)
-        & (table["part"] == part)
-        & (table["against"] == against)
-        & table["replication"].isin((THIS_RUN, POOLED))
-    ]
-    rows = {row["quantity"]: row for row in own.to_dict("records")}
+    rows = deciding_rows(effects, claim, part, against)
     if not {*QUANTITIES} <= {*rows}:
         return None
     position, orientation = (_factor(rows[quantity]) for quantity in QUANTITIES)
@@ -63,7 +56,8 @@ def _factor(row: Mapping[Hashable, Any]) -> Interval:
 
 def noise_is_mostly_the_yardsticks(folder: Path) -> Finding | None:
     """Tell the harm that noise does to localizers from what it does to the labels they meet."""
-    seen, harm = (effect_of(folder, "C5", "both", against) for against in ("labels", "true"))
+    effects = read_claims(folder).effects
+    seen, harm = (effect_of(effects, "C5", "both", against) for against in ("labels", "true"))
     if seen is None or harm is None:
         return None
     # In logarithms, in which effects that follow one another add up.
@@ -85,10 +79,9 @@ def noise_is_mostly_the_yardsticks(folder: Path) -> Finding | None:
 
 def more_frames_help(folder: Path) -> Finding | None:
     """Tell what more frames do beside what more images alone do."""
-    frames, images = (
-        effect_of(folder, "C7", "80k, not 6k"),
-        effect_of(folder, IMAGES, "twice the images"),
-    )
+    effects = read_claims(folder).effects
+    frames = effect_of(effects, "C7", "80k, not 6k")
+    images = effect_of(effects, IMAGES, "twice the images")
     if frames is None or images is None:
         return None
     if not all(f.high < 1 and f.value < i.value for f, i in zip(frames, images, strict=True)):
@@ -108,7 +101,8 @@ def more_frames_help(folder: Path) -> Finding | None:
 
 def label_errors_are_small(folder: Path) -> Finding | None:
     """Put errors of estimated labels beside those of networks, and what exact labels change."""
-    changes = [effect_of(folder, "C1", f"exact labels, not {rival}") for rival in RIVALS]
+    effects = read_claims(folder).effects
+    changes = [effect_of(effects, "C1", f"exact labels, not {rival}") for rival in RIVALS]
     shown = [change for both in changes if both is not None for change in both]
     if len(shown) < 2 * len(RIVALS):
         return None

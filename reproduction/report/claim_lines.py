@@ -21,9 +21,9 @@ from reproduction.claims.tables import (
     POOLED,
     RATE,
     SHARE,
-    THIS_RUN,
     ClaimTables,
     Part,
+    deciding_rows,
     parts_in,
     turned_percent,
 )
@@ -173,18 +173,10 @@ def _line(topic: Topic, tables: ClaimTables) -> Line | None:
 
 def _decided(told: Told, table: pd.DataFrame) -> list[tuple[Interval, float]]:
     """Return the factors on both errors with limits, and the paper's, which may be no number."""
+    rows = deciding_rows(table, told.claim, told.part, told.against)
     found = []
     for quantity in QUANTITIES:
-        own = table[
-            (table["claim"] == told.claim)
-            & (table["part"] == told.part)
-            & (table["quantity"] == quantity)
-            & (table["against"] == told.against)
-            & table["replication"].isin((THIS_RUN, POOLED))
-        ]
-        (row,) = own.to_dict("records")
-        names = ("value", "low", "high", "printed")
-        percents = [float(row[name]) for name in names]
+        percents = [float(rows[quantity][name]) for name in ("value", "low", "high", "printed")]
         if told.turned:
             value, low, high, printed = map(turned_percent, percents)
             percents = [value, high, low, printed]

@@ -12,8 +12,9 @@ import pandas as pd
 from baselines.config.learning import MODELS
 from reproduction.claims.effects import OWN, printed_cell
 from reproduction.claims.evidence import COMMON, Cell
-from reproduction.claims.levels import read_cell_errors
+from reproduction.claims.levels import UNITS, read_cell_errors
 from reproduction.config.tables import KEYS
+from reproduction.replications.archive import ON_COMMON
 from reproduction.report.published import read_table
 from reproduction.tables.cells import published_frame
 from synfeal.records.tables import rows_of
@@ -25,15 +26,11 @@ TABLES = {
     "table5_from_scratch": "Table 5, start",
 }
 SIZES = "table4_size"
-# Judged on the test set that all sizes of a scene share.
-ON_COMMON = (SIZES, "table5_from_scratch")
 # The paper's unit of position: root mean square over the axes. Both are against the labels of the
 # test set, as the paper's are.
 OURS = {"position": "position_rms_m", "orientation": "orientation_deg"}
 PRINTED = {"position": "published_position_m", "orientation": "published_orientation_deg"}
-
-
-PRINTED_ERRORS = {name: f"printed_{name}" for name in ("position_m", "orientation_deg")}
+PRINTED_ERRORS = {unit: f"printed_{unit}" for unit in UNITS}
 COLUMNS = ("table", "row", "model", "quantity", "printed", "ours", "replications")
 
 

@@ -22,7 +22,8 @@ def cells_digest(cells: pd.DataFrame) -> str:
     """Hash the cells that the figure shows."""
     return digest(
         [
-            f"{row.table}|{row.row}|{row.model}|{row.quantity}|{row.printed:.6g}|{row.ours:.6g}|{row.replications}"
+            f"{row.table}|{row.row}|{row.model}|{row.quantity}|{row.printed:.6g}|{row.ours:.6g}"
+            f"|{row.replications}"
             for row in rows_of(cells)
         ]
     )

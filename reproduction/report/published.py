@@ -1,4 +1,4 @@
-"""Which of the published results a page tells, and how their tables are read."""
+"""Choose which of the published results a page tells, and read their tables."""
 
 from __future__ import annotations
 

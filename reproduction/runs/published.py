@@ -9,7 +9,8 @@ PUBLISHED = Path("results/published")
 HEADLINES = ("night", "mini")
 # Whose jobs those of other profiles are predicted from.
 MEASURED = (PUBLISHED / "mini", PUBLISHED / "night")
-# Scores of photographs, which need recordings that are not ours to pass on.
+# Scores of photographs (`make real`), which need recordings that are not ours to pass on; they lie
+# beside those of a profile, and are part of none.
 REAL = "real"
 # Archives and pooled tables; before all are pooled, the single runs that each decided claims.
 REPLICATIONS, SINGLE_RUNS = "replications", "single_runs"

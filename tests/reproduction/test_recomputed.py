@@ -141,15 +141,13 @@ def test_the_first_lines_of_the_readme_follow_from_the_tables():
         if row["claim"] == "networks" and row["replication"] != "pooled":
             pair = float(row["printed"]), float(row["value"])
             by_replication[row["quantity"]][row["replication"]][row["part"]] = pair
-    networks = networks.split("Rank correlation")[1]
-    for quantity, text in zip(by_replication, told(networks), strict=False):
-        found = [
+    for quantity, replications in by_replication.items():
+        found = mean(
             rank_correlation(*zip(*(pairs[model] for model in MODELS), strict=True))
-            for pairs in by_replication[quantity].values()
-        ]
-        if len(by_replication[quantity]) == 1:
-            assert text == pytest.approx(mean(found), abs=0.006)
-    assert f"{told(networks)[0]:+.2f} in position".replace("-", "−") in networks
+            for pairs in replications.values()
+        )
+        (text,) = re.findall(rf"([+−][\d.]+) in {quantity}", networks)
+        assert numbers(text) == pytest.approx([found], abs=0.006)
 
 
 def test_matching_by_size_of_the_image_is_told_as_it_was_measured():

@@ -37,6 +37,7 @@ from reproduction.report.html.tables import (
 from reproduction.report.paper_cells import paper_cells
 from reproduction.report.paper_figure import paper_picture
 from reproduction.report.summary import run_sentences
+from reproduction.runs.published import REAL
 from reproduction.tables import meshes, real
 from reproduction.tables.cells import key_of, published_cells, read_cells
 from reproduction.tables.layouts import BLOCKS, SOURCES, scene_title
@@ -77,8 +78,6 @@ def data_address(path: Path) -> str:
 
 
 PROVENANCE = "provenance.json"
-# Beside the results of a profile may lie those of `make real`, which has no part in any profile.
-REAL = "real"
 HARD_CASES = (
     "Functions that all of this rests on are tested where textbook formulas lose precision:"
     " tests/hard_cases."
