@@ -18,7 +18,6 @@ from reproduction.claims.verdicts import Verdict
 from synfeal.errors import InputError
 from synfeal.records.tables import (
     COUNT,
-    LIMITLESS,
     LIMITLESS_MAYBE,
     MAYBE,
     MAYBE_TEXT,
@@ -39,7 +38,7 @@ EFFECTS_SCHEMA = {
     "quantity": TEXT,
     "against": AGAINST,
     "replication": TEXT,
-    "value": LIMITLESS,
+    "value": LIMITLESS_MAYBE,  # none where learning curves do not fall
     "low": LIMITLESS_MAYBE,
     "high": LIMITLESS_MAYBE,
     "printed": MAYBE,

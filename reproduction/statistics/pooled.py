@@ -51,11 +51,11 @@ def pool(
             limits are no narrower than the standard errors within replications ask for.
 
     Returns:
-        The pooled effect. With a single replication, or one that is not finite, its limits are
-        infinite: nothing is known of how replications differ.
+        The pooled effect. With a single replication, or one whose effect or standard error is not
+        finite, its limits are infinite: nothing is known of how replications differ.
     """
     effects = np.asarray(values, dtype=float)
-    if len(effects) < 2 or not np.isfinite(effects).all():
+    if len(effects) < 2 or not np.isfinite([*effects, *variances]).all():
         return Pooled(float(effects.mean()), -math.inf, math.inf, math.nan, len(effects))
     within = np.maximum(np.asarray(variances, dtype=float), LEAST_VARIANCE)
     with np.errstate(divide="ignore"):  # I² of effects that are all the same

@@ -53,6 +53,8 @@ def test_one_replication_and_a_failed_one_tell_nothing_of_others():
     for values in ([0.3], [0.3, math.inf, 0.2]):
         found = pool(values, [0.01] * len(values))
         assert (found.low, found.high) == (-math.inf, math.inf)
+    of_unknown_error = pool([0.3, 0.1, 0.2], [0.01, math.nan, 0.01])
+    assert (of_unknown_error.low, of_unknown_error.high) == (-math.inf, math.inf)
 
 
 def test_limits_at_a_corrected_level_are_wider():

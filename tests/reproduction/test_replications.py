@@ -273,6 +273,20 @@ def test_a_network_that_noise_makes_fail_is_told_as_one(pooled, tmp_path):
     assert main([str(tmp_path)]) == 0  # the figure
 
 
+def test_learning_curves_that_do_not_fall_leave_training_longer_unknown(tmp_path):
+    folders = [write_replication(tmp_path / str(seed), seed) for seed in (101, 102, 103)]
+    errors = read_archived(folders[1] / ERRORS)
+    first = errors["init"].str.endswith("-quarter")
+    for unit in UNITS:
+        for column in (unit, f"true_{unit}"):
+            errors.loc[first, column] //= 10
+    write_errors(errors, folders[1] / ERRORS)
+    write_pooled(folders, tmp_path)
+    told = claims_beside_print(read_claims(tmp_path))
+    assert "| from scratch, images: unknown | **undecided** |" in told
+    assert main([str(tmp_path)]) == 0  # the figure
+
+
 @pytest.mark.parametrize(("low", "said"), [(2.0, True), (-2.0, False)])
 def test_an_effect_that_is_sure_but_small_is_told_as_one(pooled, tmp_path, low, said):
     for name in (EFFECTS, CLAIMS):
