@@ -177,12 +177,18 @@ class Evidence:
             raise InputError(f"{path}: its frames are not those of the test set; {REMEDY}")
         return [medians(table[m].to_numpy(), test.path, test.counts) for m in measures]
 
+    def pose_tables(self, scene: str, size: str) -> list[str]:
+        """List the files of the true poses that a test set is made from, of training first."""
+        sizes = {size}
+        if self.score == COMMON:
+            sizes = {cell.size for cell in self.runs if cell.scene == scene}
+        tests = [f"labels/{scene}/{one}/synfeal/test.csv" for one in sorted(sizes)]
+        return [f"labels/{scene}/{size}/synfeal/train.csv", *tests]
+
     def test_set(self, scene: str, size: str) -> TestSet:
         """Return a test set, and the errors on it of always answering the mean training pose."""
-        train = self.file(f"labels/{scene}/{size}/synfeal/train.csv")
+        train, *paths = map(self.file, self.pose_tables(scene, size))
         common = self.score == COMMON
-        sizes = {cell.size for cell in self.runs if cell.scene == scene} if common else {size}
-        paths = [self.file(f"labels/{scene}/{one}/synfeal/test.csv") for one in sorted(sizes)]
         key = scene, size, common
         if key not in self._tests:
             tables = [read_pose_table(path) for path in paths]

@@ -218,13 +218,18 @@ def _archived(archive: Path) -> dict[tuple[str, ...], pd.DataFrame]:
 
 
 def _errors_of(design: Design, root: Path, archive: Path) -> Iterator[pd.DataFrame]:
-    """Yield the rows of each finished run on each test set, or those that are archived."""
+    """Yield the rows of each finished run on each test set, or those that are archived.
+
+    A run is finished when its errors are there, and the poses that place its test frames on paths.
+    """
     evidence = evidence_of(design, root)
     archived = _archived(archive)
     for test_set, run in _wanted(design):
         cell, folder = cell_of(run), root / "runs" / run.directory
-        if (folder / SCORES["labels"][0]).is_file():
-            yield _rows(cell, test_set, evidence, folder)
+        of_score = evidence.under(_score(test_set))
+        poses = [root / path for path in of_score.pose_tables(cell.scene, cell.size)]
+        if all(path.is_file() for path in (folder / SCORES["labels"][0], *poses)):
+            yield _rows(cell, test_set, of_score, folder)
         elif (*cell, test_set) in archived:
             yield archived[(*cell, test_set)]
 
@@ -256,16 +261,19 @@ def _seconds(root: Path, archive: Path) -> pd.DataFrame:
     return jobs.sort_values(["stage", "job"], ignore_index=True)
 
 
+def _score(test_set: str) -> str:
+    return COMMON if test_set == COMMON else "labels"
+
+
 def _rows(cell: Cell, test_set: str, evidence: Evidence, folder: Path) -> pd.DataFrame:
-    score = COMMON if test_set == COMMON else "labels"
-    name, columns, measures = SCORES[score]
+    name, columns, measures = SCORES[evidence.score]
     table = read_errors(folder / name, columns).iloc[::EVERY]
-    poses = evidence.under(score).test_set(cell.scene, cell.size).poses
+    poses = evidence.test_set(cell.scene, cell.size).poses
     rows = {key: getattr(cell, key) for key in KEYS[:-1]} | {"test_set": test_set}
     frame = pd.DataFrame(rows, index=range(len(table)))
     frame["frame"] = table["frame"].to_numpy(dtype=np.uint32)
     frame["path"] = poses.path[::EVERY].astype(np.uint32)
-    true = measures if score == COMMON else MEASURES[2:]
+    true = measures if test_set == COMMON else MEASURES[2:]
     for (unit, factor), measure, true_measure in zip(UNITS.items(), measures, true, strict=True):
         frame[unit] = _whole(table[measure].to_numpy(), factor)
         frame[f"true_{unit}"] = _whole(table[true_measure].to_numpy(), factor)

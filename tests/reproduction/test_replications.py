@@ -517,6 +517,17 @@ def test_a_replication_in_two_parts_is_that_in_one(papers, tmp_path):
         write_archive(tmp_path / "nothing", night, tmp_path / "103")
 
 
+def test_what_has_no_true_poses_yet_is_left_for_later(papers, tmp_path):
+    results, night = papers
+    root, archive = tmp_path / "results", tmp_path / "101"
+    shutil.copytree(results.root, root)
+    (root / "labels/sanctuary/6k/synfeal/train.csv").unlink()
+    missing = write_archive(root, night, archive)
+    runs = [t for t in remaining(night, archive) if t.endswith("/errors.csv")]
+    assert len(runs) == missing > 0
+    assert all("/runs/sanctuary/6k/" in run for run in runs)
+
+
 def test_an_unfinished_archive_is_not_pooled(tmp_path, capsys):
     for seed in (101, 102):
         write_replication(tmp_path / str(seed), seed)
