@@ -14,7 +14,7 @@ from typing import NamedTuple
 import pandas as pd
 from scipy.stats import spearmanr
 
-from reproduction.claims.effects import NETWORKS, Against
+from reproduction.claims.effects import NETWORKS, PAPERS_FIVE, Against
 from reproduction.claims.evidence import QUANTITIES
 from reproduction.claims.tables import (
     PERCENT,
@@ -226,6 +226,25 @@ def _networks(table: pd.DataFrame) -> Line | None:
         f"The lowest position error is {names} (paper: {TITLES[printed]}'s). Rank correlation with"
         f" the paper among the five{over}: {', '.join(parts)}.",
     )
+
+
+def networks_beside_print(effects: pd.DataFrame) -> str:
+    """Tabulate the error of each network over the geometric mean of the five, printed and ours.
+
+    Args:
+        effects: ``claim_effects.csv``.
+    """
+    rows = []
+    for model in PAPERS_FIVE:
+        by_quantity = deciding_rows(effects, NETWORKS, model, "true")
+        row: dict[str, str] = {"": TITLES[model]}
+        for quantity in QUANTITIES:
+            names = ("printed", "value", "low", "high")
+            printed, *ours = (1 + float(by_quantity[quantity][name]) / 100 for name in names)
+            row[f"{quantity}, printed"] = change_text(printed)
+            row[f"{quantity}, ours (95 % limits)"] = _change(*ours)
+        rows.append(row)
+    return markdown_table(pd.DataFrame(rows))
 
 
 def claims_beside_print(tables: ClaimTables) -> str:

@@ -107,6 +107,8 @@ def forest_figure(forest: Forest) -> Figure:
         axes.set_xlabel("share of batches that needed assistance")
     for axes, rows in zip((above, *below), blocks, strict=True):
         _name_claims(axes, rows, verdicts)
+    if any(row.single for row in changes):
+        above.plot([], [], "|", color="0.25", ms=7, mew=0.9, label="one replication")
     handles, titles = above.get_legend_handles_labels()
     shown = dict(zip(titles, handles, strict=True))
     figure.legend(shown.values(), shown, loc="outside upper center", ncols=len(shown))

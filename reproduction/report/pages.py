@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from reproduction.claims.tables import read_claims
+from reproduction.claims.tables import ClaimTables, read_claims
 from reproduction.claims.verdicts import published_claims
 from reproduction.real.findings import real_findings, real_headline, real_short, real_table
 from reproduction.report.claim_changes import changes_since_single_runs
@@ -27,6 +27,7 @@ from reproduction.report.claim_lines import (
     as_markdown,
     claim_lines,
     claims_beside_print,
+    networks_beside_print,
 )
 from reproduction.report.findings import Finding, can_tell, findings, sentences, short_sentences
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
@@ -127,14 +128,17 @@ def difficulty(folder: Path = DIFFICULTY) -> str:
 
 def lines(root: Path) -> str:
     """Tell what was reproduced, by the effects of the claims."""
-    return as_markdown(claim_lines(read_claims(claims_folder(root.parent))))
+    return as_markdown(claim_lines(_claims_beside(root)))
 
 
 def verdicts(root: Path) -> str:
     """Tell each claim in a line, and what is unclear about it in print."""
     notes = [f"- {claim.id}: {claim.footnote}" for claim in published_claims() if claim.footnote]
-    table = claims_beside_print(read_claims(claims_folder(root.parent)))
-    return "\n".join([table, "", *notes])
+    return "\n".join([claims_beside_print(_claims_beside(root)), "", *notes])
+
+
+def _claims_beside(root: Path) -> ClaimTables:
+    return read_claims(claims_folder(root.parent))
 
 
 def pooled(root: Path, name: str) -> str:
@@ -150,6 +154,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "origin": origin,
     # Of all published runs together, whatever profile the mark names.
     "verdicts": verdicts,
+    "networks": lambda root: networks_beside_print(_claims_beside(root).effects),
     "changed": lambda root: changes_since_single_runs(root.parent),
     "label_quality": lambda root: label_quality(claims_folder(root.parent)),
     "meshes": meshes_beside_print,
