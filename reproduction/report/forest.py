@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from reproduction.claims.tables import PERCENT, SHARE, Part, parts_in, read_claims
 from reproduction.claims.verdicts import published_claims
@@ -107,10 +108,11 @@ def forest_figure(forest: Forest) -> Figure:
         axes.set_xlabel("share of batches that needed assistance")
     for axes, rows in zip((above, *below), blocks, strict=True):
         _name_claims(axes, rows, verdicts)
-    if any(row.single for row in changes):
-        above.plot([], [], "|", color="0.25", ms=7, mew=0.9, label="one replication")
     handles, titles = above.get_legend_handles_labels()
     shown = dict(zip(titles, handles, strict=True))
+    if any(row.single for row in changes):
+        tick: Style = {"ls": "", "color": "0.25", "ms": 7, "mew": 0.9}
+        shown["one replication"] = Line2D([], [], marker="|", **tick)
     figure.legend(shown.values(), shown, loc="outside upper center", ncols=len(shown))
     return figure
 
