@@ -132,6 +132,14 @@ def choose_detail(
         poses: ``world_from_cam`` (N, 4, 4) of the frames; :data:`VIEWS` of them are compared.
         render: Backend and samples of the frames.
     """
+    log.info(
+        "choosing a level of detail for %dx%d: smaller textures and fewer of %d faces, compared with"
+        " the full mesh in %d views",
+        camera.width,
+        camera.height,
+        mesh.n_faces,
+        min(VIEWS, len(poses)),
+    )
     judge = _Judge.of(mesh, camera, poses, resolved(render))
     tried = [judge.level(mesh, 1)]
     full = tried[0]
