@@ -36,6 +36,7 @@ from synfeal.dataset.posed_sequence import read_posed_sequence
 from synfeal.errors import Argument, InputError
 from synfeal.mesh.checks import SUFFIXES
 from synfeal.records.files import read_json, write_json
+from synfeal.records.lock import LOCK, only_command, remove_unfinished
 from synfeal.records.progress import Outlook, Progress, duration_text
 from synfeal.scanning.camera import CameraOptions
 from synfeal.scanning.fusion import load_open3d
@@ -118,7 +119,8 @@ def build(job: PlaceJob, say: Callable[[str], None] = print) -> dict[str, Any]:
         Content of ``place.json``.
 
     Raises:
-        InputError: The source cannot be used, or the folder holds another place.
+        InputError: The source cannot be used, the folder holds another place, or another build is
+            at work there.
     """
     place = Place(job.out)
     capture = None
@@ -127,6 +129,19 @@ def build(job: PlaceJob, say: Callable[[str], None] = print) -> dict[str, Any]:
         _refuse_without_depth(job, capture)
         load_open3d()  # now, not after minutes of unpacking
     record = _begin(job, place)
+    with only_command(job.out, job.out / LOCK):
+        remove_unfinished(job.out)
+        return _built(job, place, capture, record, say)
+
+
+def _built(
+    job: PlaceJob,
+    place: Place,
+    capture: Capture | None,
+    record: dict[str, Any],
+    say: Callable[[str], None],
+) -> dict[str, Any]:
+    """Make the stages that are due; see :func:`build`."""
     run = _Run(_expected_s(job, 0 if capture is None else len(capture)), say)
     if job.is_mesh:
         known = _render_mesh(job, place, run)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -27,6 +28,8 @@ from synfeal.dataset.posed_sequence import PosedFrames
 from synfeal.geometry.poses import pose_error, pose_from_quat, pose_matrix
 from synfeal.geometry.rotations import rotation_from_rpy
 from synfeal.mesh.save import save_glb
+from synfeal.records.files import unfinished_prefix
+from synfeal.records.lock import only_command
 from synfeal.render.choose import open_renderer
 from tests.support.capture_writers import HEIGHT, WIDTH, Y_UP_FROM_ROOM, camera, scanner_app
 from tests.support.small_room import SIZE_M, furnished_room
@@ -134,6 +137,18 @@ def test_built_again_nothing_is_made_anew(place, capture, capsys):
     assert main(["build", str(capture), "--out", str(place), *BUILD]) == 0
     assert {path: path.stat().st_mtime_ns for path in place.rglob("*.glb")} == before
     assert capsys.readouterr().out.count("was there") == N_STAGES
+
+
+def test_two_builds_do_not_work_in_one_folder(place, capture, capsys):
+    of_nobody = f"-{2**22 + 1}-"  # above the largest number of a process
+    left = place / f"{unfinished_prefix('scan').replace(f'-{os.getpid()}-', of_nobody)}killed"
+    left.mkdir()
+    with only_command(place, place / ".lock"):
+        assert main(["build", str(capture), "--out", str(place), *BUILD]) == 1
+    assert "another run is at work there" in capsys.readouterr().err
+    assert main(["build", str(capture), "--out", str(place), *BUILD]) == 0
+    assert not left.exists()
+    assert not (place / ".lock").exists()
 
 
 def test_a_place_goes_on_where_it_was_moved_to(place, capture, tmp_path, capsys):
