@@ -178,3 +178,12 @@ def test_the_version_stands_in_one_place():
     hooks = [(ROOT / folder / "hatch_build.py").read_bytes() for folder in list(FOLDERS)[1:]]
     assert hooks[0] == hooks[1]
     assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == VERSION
+
+
+def test_the_page_installs_the_torch_that_is_locked():
+    (locked,) = (
+        line
+        for line in (ROOT / "requirements.lock").read_text().splitlines()
+        if line.startswith("torch==")
+    )
+    assert f"pip install {locked} --index-url" in (ROOT / "docs/installing.md").read_text()
