@@ -27,16 +27,17 @@ def test_the_readme_tells_the_same(table):
     readme = (ROOT / "README.md").read_text()
     errors_cm, held, counts, angles_deg = [], [], [], []
     for place in ("corridor", "freiburg1_rpy", "RedKitchen"):
-        found = table[(table.place == place) & (table.status == "localized")]
+        of_place = table[table.place == place]
+        found = of_place[of_place.status == "localized"]
         errors_cm.append(f"{100 * found[POSITION].median():.1f}")
-        counts.append(len(found))
+        counts.append(f"{len(found)} of {len(of_place)}")
         angles_deg.append(found[ORIENTATION].median())
         stated = found[found["position_95_m"].notna()]
         held.append(f"{100 * (stated[POSITION] <= stated['position_95_m']).mean():.0f}")
-    assert "{}, {} and {} cm off".format(*errors_cm) in readme
     ends = f"{min(angles_deg):.1f} to {max(angles_deg):.1f}°"
-    assert "(medians of {}, {} and {}; {})".format(*counts, ends) in readme
-    assert "hold {}, {} and {} %".format(*held) in readme
+    localized = "{}, {} and {} are localized, to {}, {} and {} cm".format(*counts, *errors_cm)
+    assert f"{localized} (medians; {ends})" in readme
+    assert "contain {}, {} and {} % of the errors".format(*held) in readme
 
 
 def test_a_summary_in_closed_form():
