@@ -1,10 +1,11 @@
 """Verdicts on the effects of claims, by the limits of each.
 
-Limits are put into percent and turned so that the claimed direction is positive. Regions and
-thresholds are those of :mod:`reproduction.claims.verdicts`: two thirds of the printed effect where
-the claim prints a size, 5 % where it names a direction, and any effect where it names an order.
-A claim holds when all of its parts do. It is refuted by a part that is decided otherwise at the
-level corrected for their number.
+Limits are of logarithms of ratios, turned so that the claimed direction is positive: whichever of
+two errors is the base, the verdict is the same. Regions and thresholds are those of
+:mod:`reproduction.claims.verdicts`: two thirds of the printed effect where the claim prints a size,
+5 % where it names a direction, and any effect where it names an order. A claim holds when all of
+its parts do. It is refuted by a part that is decided otherwise at the level corrected for their
+number.
 
 Where limits come from is left to whoever asks: test paths and training runs of a single run, or the
 spread over replications.
@@ -16,9 +17,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from reproduction.claims.effects import Asked
+from reproduction.claims.effects import BEST_NETWORK, Asked
 from reproduction.claims.verdicts import DECIDED_AGAINST, ENOUGH, FEW, NOT_COPING, SMALLEST, Verdict
 
+# Claims that one thing is better than each of several others, and claims about so many things.
+BEST = ("C12", BEST_NETWORK)
+SEVERAL = {"C11": 3}
 # Of the number of effects that one is judged with (Bonferroni), its two-sided 95 % limits.
 Limits = Callable[[int], tuple[float, float]]
 
@@ -30,6 +34,8 @@ class Condition(NamedTuple):
     sign: int  # sign of the claimed direction
     limits: Limits  # of the logarithm of a ratio
     printed: float = math.nan  # the same in print, where it can be computed
+    # Sets two effects against each other, of which it tells neither: no part is borne out by it.
+    compares: bool = False
 
 
 def percent(log_ratio: float) -> float:
@@ -39,16 +45,16 @@ def percent(log_ratio: float) -> float:
 
 def verdict_of(condition: Condition, comparisons: int = 1) -> Verdict:
     """Judge one effect by its limits, at the level corrected for ``comparisons``."""
-    ends = sorted(condition.sign * percent(end) for end in condition.limits(comparisons))
-    smallest = 0.0 if condition.asked == "order" else SMALLEST
+    ends = sorted(condition.sign * end for end in condition.limits(comparisons))
+    smallest = 0.0 if condition.asked == "order" else math.log1p(SMALLEST / 100)
     enough = smallest
     if condition.asked == "size":
-        enough = max(smallest, ENOUGH * abs(percent(condition.printed)))
+        enough = max(smallest, ENOUGH * abs(condition.printed))
     return _region(ends[0], ends[1], smallest, enough, condition.asked == "size")
 
 
 def _region(low: float, high: float, smallest: float, enough: float, printed: bool) -> Verdict:
-    """Judge limits in percent, positive in the claimed direction."""
+    """Judge limits of a logarithm, positive in the claimed direction."""
     if low >= enough and low > 0:
         return Verdict.HOLDS
     if high <= -smallest and high < 0:
@@ -64,15 +70,56 @@ def judge(conditions: Sequence[Condition]) -> Verdict:
     """Judge a claim that holds if all of its conditions do."""
     verdicts = [verdict_of(condition) for condition in conditions]
     corrected = [verdict_of(condition, len(conditions)) for condition in conditions]
-    against = {verdict for verdict in corrected if verdict in DECIDED_AGAINST}
+    against = [verdict for verdict in corrected if verdict in DECIDED_AGAINST]
     if not against:
         return Verdict.HOLDS if set(verdicts) == {Verdict.HOLDS} else Verdict.UNDECIDED
-    if Verdict.HOLDS in verdicts:
+    pairs = zip(conditions, verdicts, strict=True)
+    if any(verdict == Verdict.HOLDS and not own.compares for own, verdict in pairs):
         return Verdict.MIXED
-    if len(against) == 1:
-        return next(iter(against))
-    less = Verdict.LESS in against and Verdict.OPPOSITE not in against
-    return Verdict.LESS if less else Verdict.MIXED
+    kinds = {*against}
+    if len(against) == len(conditions):
+        if len(kinds) == 1:
+            return kinds.pop()
+        if Verdict.OPPOSITE not in kinds:
+            return Verdict.LESS
+    return Verdict.REFUTED
+
+
+def judge_claim(claim: str, parts: Mapping[str, Sequence[Condition]]) -> Verdict:
+    """Judge a claim about errors by the rule for what it says.
+
+    Args:
+        claim: Its id.
+        parts: The effects of each of its parts.
+    """
+    every = [condition for of_part in parts.values() for condition in of_part]
+    if claim in BEST:
+        return judge_best(every)
+    if claim in SEVERAL:
+        return judge_several(list(parts.values()), SEVERAL[claim])
+    return judge(every)
+
+
+def judge_several(things: Sequence[Sequence[Condition]], number: int) -> Verdict:
+    """Judge a claim that all conditions hold for at least so many things, whichever they are.
+
+    These are partial conjunctions (Benjamini and Heller, "Screening for Partial Conjunction
+    Hypotheses", Biometrics 2008): that m of n effects exist is as sure as the m-th surest one of
+    them is at the level corrected for n - m + 1. The claim is refuted when so many things do
+    certainly not what it says that fewer than ``number`` are left.
+
+    Args:
+        things: The conditions of each.
+        number: How many of them are claimed to meet theirs.
+    """
+    spare = len(things) - number + 1
+    met = sum(all(verdict_of(c, spare) == Verdict.HOLDS for c in own) for own in things)
+    if met >= number:
+        return Verdict.HOLDS
+    missed = sum(
+        any(verdict_of(c, number * len(own)) in DECIDED_AGAINST for c in own) for own in things
+    )
+    return Verdict.REFUTED if missed >= spare else Verdict.UNDECIDED
 
 
 def judge_best(rivals: Sequence[Condition]) -> Verdict:

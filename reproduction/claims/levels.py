@@ -33,7 +33,8 @@ CELLS_SCHEMA = {
     **ERRORS,
     "replications": COUNT,
 }
-LABELS_SCHEMA = {"method": TEXT, **ERRORS, "replications": COUNT}
+RMSE = "position_m_rmse"  # of all frames of all replications, which single failures show in
+LABELS_SCHEMA = {"method": TEXT, **ERRORS, RMSE: LIMITLESS, "replications": COUNT}
 
 
 def read_cell_errors(folder: Path) -> pd.DataFrame:
@@ -46,7 +47,7 @@ def read_cell_errors(folder: Path) -> pd.DataFrame:
 
 
 def read_label_errors(folder: Path) -> pd.DataFrame:
-    """Read the median errors of training labels, by method.
+    """Read the median errors of training labels, and their root mean square, by method.
 
     Raises:
         InputError: The table cannot be read.

@@ -8,6 +8,7 @@ rooms, paths and label sets: that takes replications (:mod:`reproduction.replica
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -31,15 +32,13 @@ from reproduction.claims.evidence import COMMON, Cell, Evidence, Missing, eviden
 from reproduction.claims.judge import (
     Condition,
     Limits,
-    judge,
-    judge_best,
+    judge_claim,
     judge_few,
     judge_many,
     percent,
     reached,
 )
 from reproduction.claims.tables import (
-    BEST,
     PERCENT,
     RATE,
     SHARE,
@@ -167,15 +166,17 @@ def _judge_errors(found: RunClaims, evidence: Evidence, claim: str, against: Aga
         if claim not in DESCRIBED:
             found.untested(keys, str(missing))
         return
-    conditions = []
+    parts = defaultdict[str, list[Condition]](list)
     for effect in asserted:
         printed = printed_effects().get(effect[:4], math.nan)
         of_sample = partial(limits, effect.sample, own.layout)
-        conditions.append(Condition(effect.asked, effect.sign, of_sample, printed))
+        parts[effect.part].append(
+            Condition(effect.asked, effect.sign, of_sample, printed, effect.compares)
+        )
         found.rows.append(_effect_row(effect, of_sample(), printed))
     if claim in DESCRIBED:
         return
-    verdict = judge_best(conditions) if claim == BEST else judge(conditions)
+    verdict = judge_claim(claim, parts)
     fewest = min(own.test_paths.values())
     if unlearnt:
         more = f" and {len(unlearnt) - 1} more" if len(unlearnt) > 1 else ""

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reproduction.claims.effects import DESCRIBED, Against
+from reproduction.claims.effects import BEST_NETWORK, DESCRIBED, Against
+from reproduction.claims.judge import BEST
 from reproduction.claims.verdicts import Verdict
 from synfeal.errors import InputError
 from synfeal.records.tables import (
@@ -53,8 +54,6 @@ CLAIMS_SCHEMA = {
     "reason": MAYBE_TEXT,
 }
 PERCENT, SHARE, RATE = "percent", "share", "frames/s"
-# Claims that one thing is best have a row for each rival; the nearest one decides.
-BEST = "C12"
 # Parts that are shown the other way round than they are judged, as the harm of what is there.
 SHOWN = {"no noise, not the most": "the most noise, not none"}
 REMEDY = "make the claims again"
@@ -157,10 +156,15 @@ def write_claims(
             "reason": (reasons or {}).get((claim, against), ""),
         }
         for (claim, against), verdict in sorted(
-            verdicts.items(), key=lambda item: (int(item[0][0][1:]), item[0][1])
+            verdicts.items(), key=lambda item: (_place(item[0][0]), item[0][1])
         )
     ]
     write_frame(folder / CLAIMS, pd.DataFrame(judged, columns=list(CLAIMS_SCHEMA)))
+
+
+def _place(claim: str) -> int:
+    """Number a claim by its id; what is judged beside the claims comes last."""
+    return int(claim[1:]) if claim[1:].isdigit() else 100
 
 
 def deciding_rows(
@@ -190,16 +194,22 @@ def parts_in(table: pd.DataFrame, against: Against = "true") -> list[Part]:
         table: ``claim_effects.csv``.
         against: What errors are measured against, where a claim has both.
     """
-    wanted = table[~table["claim"].isin(DESCRIBED)]
+    wanted = table[~table["claim"].isin((*DESCRIBED, BEST_NETWORK))]
     both = wanted["claim"].isin(wanted.loc[wanted["against"] == "labels", "claim"])
     wanted = wanted[~both | (wanted["against"] == against)]
     found = [
         _part(values) for _, values in wanted.groupby(["claim", "part", "quantity"], sort=False)
     ]
-    best = [part for part in found if part.claim == BEST]
-    nearest = max(best, key=lambda part: part.decided[2], default=None)
-    kept = [part for part in found if part.claim != BEST or part is nearest]
-    return sorted(kept, key=lambda part: int(part.claim.removeprefix("C")))
+    nearest = {_nearest([p for p in found if p.claim == claim]) for claim in BEST}
+    kept = [part for part in found if part.claim not in BEST or part in nearest]
+    return sorted(kept, key=lambda part: _place(part.claim))
+
+
+def _nearest(rivals: Sequence[Part]) -> Part | None:
+    """Pick the rival that decides: the one that is surest to be better, else the nearest."""
+    better = [part for part in rivals if part.decided[1] > 0]
+    end = 1 if better else 2
+    return max(better or rivals, key=lambda part: part.decided[end], default=None)
 
 
 def _part(values: pd.DataFrame) -> Part:

@@ -1,11 +1,13 @@
 """The claims of the paper, and the verdicts there are on them.
 
-Every part of a claim is an effect in percent, positive in the direction the paper claims. Its 95 %
-limits are compared with four regions, as in equivalence testing (Lakens, "Equivalence Tests",
-Social Psychological and Personality Science 2017): an effect smaller than the smallest of interest
-is none; at least two thirds of the published one is a replication. The verdict is the region the
-whole interval lies in, and *undecided* where it lies in none, so that a narrower interval can only
-be nearer to the right verdict: two one-sided tests at 2.5 % each.
+Every part of a claim is an effect, the logarithm of a ratio, positive in the direction the paper
+claims. Two thirds of a printed effect are so of its logarithm: of a fall by 55 %, a fall by 41 %.
+So it does not matter which of two errors is the base. Its 95 % limits are compared with four
+regions, as in equivalence testing (Lakens, "Equivalence Tests", Social Psychological and
+Personality Science 2017): an effect smaller than the smallest of interest is none; at least two
+thirds of the published one is a replication. The verdict is the region the whole interval lies in,
+and *undecided* where it lies in none, so that a narrower interval can only be nearer to the right
+verdict: two one-sided tests at 2.5 % each.
 
 =================================== ====================================================
 interval                            verdict
@@ -24,12 +26,14 @@ Simonsohn calls it in "Small Telescopes", Psychological Science 2015). It needs 
 *Negligible* says that an effect is smaller than anybody cares for, not that there is none.
 
 A claim of several parts holds when all do. It is refuted by one that is decided otherwise at the
-level corrected for their number (Bonferroni); then the verdict is that part's, *smaller than
-published* where one is that and the others are refuted too, none as opposite, else *mixed*. A claim
-about every localizer is judged by the mean effect over the localizers.
+level corrected for their number (Bonferroni). Where all parts are so decided, and alike, the
+verdict is theirs; *smaller than published* where they are not alike and none is opposite. Else it
+is *mixed* where another part holds, and *refuted* where none does. A claim about every localizer is
+judged by the mean effect over the localizers.
 
 A claim that one thing is the best of all holds when it is better than every other, and is *refuted*
-by one that is better than it, at the level corrected for their number.
+by one that is better than it, at the level corrected for their number. A claim about three of five
+localizers holds when the third surest is sure at the level corrected for three.
 """
 
 from __future__ import annotations
@@ -66,7 +70,7 @@ MEANINGS = {
     Verdict.LESS: "certainly smaller than printed; the limits tell whether there is any",
     Verdict.NEGLIGIBLE: "if there is an effect, it is certainly smaller than 5 %",
     Verdict.OPPOSITE: "there certainly is an effect, the other way round",
-    Verdict.REFUTED: "something else is certainly better than what is claimed to be the best",
+    Verdict.REFUTED: "part of the claim is certainly not so, and no part is borne out",
     Verdict.UNDECIDED: "these runs cannot tell",
     Verdict.NOT_LEARNT: "the localizers have learnt too little for the question to make sense",
     Verdict.NOT_TESTABLE: "this set-up cannot answer the question",

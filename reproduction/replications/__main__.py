@@ -26,6 +26,7 @@ from synfeal.errors import InputError, exit_status
 
 PROFILE = (Path("config/config.yaml"), Path("config/replication.yaml"))
 ARCHIVES = PUBLISHED / REPLICATIONS
+ANNOUNCED = range(101, 106)  # seeds, docs/rules.md
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -56,6 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(arguments: argparse.Namespace) -> None:
     if arguments.command == "pool":
         folders = sorted(path.parent for path in arguments.archives.glob(f"*/{ERRORS}"))
+        _check_announced([folder.name for folder in folders], arguments.archives)
         for folder in folders:
             _check_whole(folder)
         write_pooled(folders, arguments.archives)
@@ -73,6 +75,17 @@ def _run(arguments: argparse.Namespace) -> None:
 def _profile(seed: int, name: str) -> Config:
     values = merge(*map(read_yaml, PROFILE))
     return parse_config(merge(values, {"seed": seed, "profile": name}), str(PROFILE[-1]))
+
+
+def _check_announced(names: Sequence[str], archives: Path) -> None:
+    """Refuse to pool other replications than were announced, or fewer."""
+    if list(names) != [*map(str, ANNOUNCED)]:
+        raise InputError(
+            archives,
+            f"has replications {', '.join(names) or 'none'}; {', '.join(map(str, ANNOUNCED))} were"
+            " announced, to be judged together",
+            "make the others first, keep further ones elsewhere",
+        )
 
 
 def _check_whole(archive: Path) -> None:

@@ -21,13 +21,20 @@ import numpy as np
 import pandas as pd
 
 from reproduction.claims.effects import OWN, Against
-from reproduction.claims.evidence import COMMON, SCORES, Cell, Evidence, cell_of, evidence_of
+from reproduction.claims.evidence import (
+    COMMON,
+    SCORES,
+    Cell,
+    Evidence,
+    cell_of,
+    evidence_of,
+)
 from reproduction.config.profile import Config
 from reproduction.design.experiments import Design, Run, read_design
 from reproduction.design.files import SPLITS, Files
 from reproduction.runs.job_times import read_measured
 from reproduction.runs.results import read_text
-from reproduction.statistics.limits import MEASURES, read_errors
+from reproduction.statistics.limits import MEASURES, REMEDY, read_errors
 from reproduction.tables.label_error import SCHEMA as LABEL_ERROR_SCHEMA
 from synfeal.errors import InputError
 from synfeal.evaluation.bootstrap import Array, medians, path_counts
@@ -188,6 +195,11 @@ class Archive:
         table = pd.read_csv(self.folder / ASSISTANCE)
         return table[table["split"] == "total"].set_index("method")
 
+    def batches_of(self, method: str) -> tuple[int, int]:
+        """Count the batches of a label method that needed assistance, and all of them."""
+        some, total = self.assistance.loc[[method], ["assisted", "batches"]].to_numpy(dtype=int)[0]
+        return int(some), int(total)
+
 
 def _wanted(design: Design) -> list[tuple[str, Run]]:
     """List the test sets and localizers that are archived, a localizer on each set it is judged on.
@@ -271,6 +283,8 @@ def _rows(cell: Cell, test_set: str, evidence: Evidence, folder: Path) -> pd.Dat
     poses = evidence.test_set(cell.scene, cell.size).poses
     rows = {key: getattr(cell, key) for key in KEYS[:-1]} | {"test_set": test_set}
     frame = pd.DataFrame(rows, index=range(len(table)))
+    if not np.array_equal(table["frame"], poses.frame[::EVERY]):
+        raise InputError(folder / name, "its frames are not those of the test set", REMEDY)
     frame["frame"] = table["frame"].to_numpy(dtype=np.uint32)
     frame["path"] = poses.path[::EVERY].astype(np.uint32)
     true = measures if test_set == COMMON else MEASURES[2:]

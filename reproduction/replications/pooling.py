@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -21,8 +22,7 @@ from reproduction.claims.effects import (
 from reproduction.claims.judge import (
     Condition,
     Limits,
-    judge,
-    judge_best,
+    judge_claim,
     judge_few,
     judge_many,
     percent,
@@ -32,18 +32,19 @@ from reproduction.claims.levels import (
     CELLS_SCHEMA,
     LABEL_ERRORS,
     LABELS_SCHEMA,
+    RMSE,
     UNITS,
     limits_columns,
 )
 from reproduction.claims.run import KINECT_FUSION, NOT_JUDGED
-from reproduction.claims.tables import BEST, PERCENT, POOLED, SHARE, Keys, Row, write_claims
+from reproduction.claims.tables import PERCENT, POOLED, SHARE, Keys, Row, write_claims
 from reproduction.claims.verdicts import Verdict
 from reproduction.replications.archive import UNITS as ARCHIVED_UNITS
 from reproduction.replications.archive import Archive
 from reproduction.statistics.pooled import Pooled, pool
 from reproduction.tables.assistance import PUBLISHED_ASSISTED, PUBLISHED_BATCHES
 from synfeal.errors import InputError
-from synfeal.evaluation.bootstrap import limits
+from synfeal.evaluation.bootstrap import Array, limits
 from synfeal.records.tables import frame_of, write_frame
 
 Key = tuple[str, str, str, Against]
@@ -94,25 +95,25 @@ def write_pooled(folders: Sequence[Path], out: Path) -> None:
     archives = {folder.name: Archive(folder) for folder in folders}
     seeds = list(archives)
     rows: list[Row] = []
-    by_claim: dict[Keys, list[Condition]] = {}
+    by_claim = defaultdict[Keys, dict[str, list[Condition]]](dict)
     for key, effects in _by_key(archives).items():
         part, printed = _part(effects), printed_effects().get(key, math.nan)
         rows += _effect_rows(key, part, printed, dict(zip(seeds, effects, strict=True)))
-        condition = Condition(effects[0].asked, effects[0].sign, part.limits, printed)
-        by_claim.setdefault((key[0], key[3]), []).append(condition)
+        first = effects[0]
+        condition = Condition(first.asked, first.sign, part.limits, printed, first.compares)
+        by_claim[key[0], key[3]].setdefault(first.part, []).append(condition)
     verdicts: dict[Keys, Verdict] = {
-        keys: judge_best(conditions) if keys[0] == BEST else judge(conditions)
-        for keys, conditions in by_claim.items()
+        keys: judge_claim(keys[0], parts)
+        for keys, parts in by_claim.items()
         if keys[0] not in DESCRIBED
     }
-    shares = {
-        method: odds_of(
-            [tuple(a.assistance.loc[method, ["assisted", "batches"]]) for a in archives.values()]
-        )
+    counts = {
+        method: [archive.batches_of(method) for archive in archives.values()]
         for method in (*RIVALS, KINECT_FUSION)
     }
-    for method, own in shares.items():
-        rows += _share_rows(method, own, seeds)
+    shares = {method: odds_of(of_method) for method, of_method in counts.items()}
+    for method, of_method in counts.items():
+        rows += _share_rows(method, dict(zip(seeds, of_method, strict=True)))
     verdicts["C4", ""] = judge_few({method: limits_of(shares[method]) for method in RIVALS})
     verdicts["C15", ""] = judge_many(limits_of(shares[KINECT_FUSION]))
     out.mkdir(parents=True, exist_ok=True)
@@ -133,7 +134,7 @@ def _cell_rows(archives: Sequence[Archive]) -> Iterator[Row]:
             row: dict[str, object] = {**cell._asdict(), "test_set": test_set, "against": against}
             quantities = zip(UNITS, SCALES, zip(*samples, strict=True), strict=True)
             for unit, scale, of_error in quantities:
-                pooled = pool([s[0] for s in of_error], [np.var(s[1:], ddof=1) for s in of_error])
+                pooled = pool([s[0] for s in of_error], [_variance(s) for s in of_error])
                 row |= limits_columns(unit, *map(float, np.exp(pooled[:3]) / scale))
             yield row | {"replications": len(archives)}
 
@@ -147,7 +148,8 @@ def _label_rows(archives: Sequence[Archive]) -> Iterator[Row]:
             logs = [math.log(table.loc[method, f"{unit}_median"]) for table in tables]
             pooled = pool(logs, [0.0] * len(logs))  # all labels of a replication are counted
             row |= limits_columns(unit, *map(float, np.exp(pooled[:3])))
-        yield row | {"replications": len(archives)}
+        squares = [table.loc[method, "position_m_rmse"] ** 2 for table in tables]
+        yield row | {RMSE: math.sqrt(np.mean(squares)), "replications": len(archives)}
 
 
 def _by_key(archives: Mapping[str, Archive]) -> dict[Key, list[Effect]]:
@@ -162,8 +164,14 @@ def _by_key(archives: Mapping[str, Archive]) -> dict[Key, list[Effect]]:
 def _part(effects: Sequence[Effect]) -> Part:
     return Part(
         values=tuple(float(effect.sample[0]) for effect in effects),
-        variances=tuple(float(np.var(effect.sample[1:], ddof=1)) for effect in effects),
+        variances=tuple(_variance(effect.sample) for effect in effects),
     )
+
+
+def _variance(sample: Array) -> float:
+    """Return the squared standard error of what was observed; none where a resample failed."""
+    with np.errstate(invalid="ignore"):
+        return float(np.var(sample[1:], ddof=1))
 
 
 def _effect_rows(
@@ -218,7 +226,9 @@ def limits_of(shares: Shares) -> Limits:
     return limits_at
 
 
-def _share_rows(method: str, shares: Shares, seeds: Sequence[str]) -> Iterator[Row]:
+def _share_rows(method: str, counts: Mapping[str, tuple[int, int]]) -> Iterator[Row]:
+    """Yield the shares of assisted batches by replication, and their pooled one."""
+    shares = odds_of(list(counts.values()))
     assisted = PUBLISHED_ASSISTED.get(method)
     same: dict[str, object] = {
         "claim": "C15" if method == KINECT_FUSION else "C4",
@@ -228,11 +238,11 @@ def _share_rows(method: str, shares: Shares, seeds: Sequence[str]) -> Iterator[R
         "printed": math.nan if assisted is None else assisted / PUBLISHED_BATCHES,
         "unit": SHARE,
     }
-    for seed, value, variance in zip(seeds, *shares, strict=True):
+    for (seed, (some, total)), variance in zip(counts.items(), shares.variances, strict=True):
         yield {
             **same,
             "replication": seed,
-            "value": 1 / (1 + math.exp(-value)),
+            "value": some / total,
             "standard_error": math.sqrt(variance),
         }
     numbers = share(pooled_odds(shares))

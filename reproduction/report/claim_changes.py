@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from reproduction.claims.tables import ClaimTables, has_claims, read_claims
-from reproduction.claims.verdicts import published_claims
+from reproduction.claims.verdicts import Verdict, published_claims
 from reproduction.report.claim_lines import verdicts_of
 from reproduction.runs.published import REPLICATIONS, SINGLE_RUNS
 from reproduction.tables.sheet import markdown_table
@@ -15,6 +15,9 @@ from reproduction.tables.sheet import markdown_table
 HEADING = (
     "## What replications changed\n\nVerdicts of single runs, each told by the run that decided:"
 )
+
+
+NOT_FOUND_OUT = {Verdict.NOT_TESTABLE, Verdict.BY_CONSTRUCTION}
 
 
 def changes_since_single_runs(published: Path) -> str:
@@ -35,9 +38,10 @@ def changes_since_single_runs(published: Path) -> str:
 
 def _row(claim: str, before: ClaimTables, after: ClaimTables) -> dict[str, str]:
     old, new = verdicts_of(claim, before), verdicts_of(claim, after)
-    return {
-        "": claim,
-        "single runs": old,
-        "replications, pooled": new,
-        "changed": "yes" if old != new else "",
-    }
+    change = ""
+    if old != new and not {old, new} & NOT_FOUND_OUT:
+        was_open, is_open = (Verdict.UNDECIDED in one for one in (old, new))
+        change = "decided otherwise"
+        if was_open != is_open:
+            change = "no longer decided" if is_open else "now decided"
+    return {"": claim, "single runs": old, "replications, pooled": new, "change": change}

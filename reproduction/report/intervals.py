@@ -56,7 +56,9 @@ def cell_interval(row: Any, measure: str) -> Interval:
 
 
 def change_text(factor: float) -> str:
-    """Format a factor as a change in percent."""
+    """Format a factor as a change in percent; none of a number that is not finite."""
+    if not math.isfinite(factor):
+        return "unknown"
     change = round(100 * (factor - 1))  # an integer has no minus zero
     return f"{change:+d} %".replace("-", "−") if change else "0 %"
 

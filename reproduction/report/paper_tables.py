@@ -15,6 +15,7 @@ from reproduction.claims.levels import read_label_errors
 from reproduction.claims.tables import SHARE, Part, has_claims, parts_in, read_claims
 from reproduction.plan.plan import planned_tables
 from reproduction.plan.text import duration
+from reproduction.replications.archive import ON_COMMON
 from reproduction.report.claim_lines import part_text
 from reproduction.report.paper_cells import pooled_rows
 from reproduction.report.published import read_table
@@ -35,8 +36,9 @@ HEADINGS = {
 CORES = 2
 POOLED_HEADING = (
     "## Over {} replications\n\nGeometric means over rooms, paths, label sets and weights drawn"
-    " anew, with 95 % limits over replications *(printed values in brackets)*:"
+    " anew, with 95 % limits over replications{} *(printed values in brackets)*:"
 )
+FOR_ALL_SIZES = ", errors against the true poses of one test set for all sizes of a scene"
 
 
 def meshes_beside_print(root: Path) -> str:
@@ -78,7 +80,8 @@ def pooled_beside_print(folder: Path, name: str) -> str:
     cells = pooled_rows(folder, name).dropna(subset=["replications"])
     rows = [_row_title(name, cell) for cell in rows_of(cells)]
     table = by_localizer(cells, HEADINGS[name], rows, _pooled_cell)
-    return f"{POOLED_HEADING.format(int(cells['replications'].max()))}\n\n{table}"
+    test_set = FOR_ALL_SIZES if name in ON_COMMON else ""
+    return f"{POOLED_HEADING.format(int(cells['replications'].max()), test_set)}\n\n{table}"
 
 
 def _pooled_cell(cell: Any) -> str:
@@ -146,6 +149,7 @@ def label_quality(folder: Path) -> str:
         {
             "labels from": label_title(row.method),
             "median error": f"{100 * row.position_m:.1f} cm, {row.orientation_deg:.2f}°",
+            "root mean square": f"{100 * row.position_m_rmse:.1f} cm",
             "batches assisted (95 % limits)": assisted.get(row.method, "–"),
         }
         for row in rows_of(read_label_errors(folder))

@@ -146,7 +146,10 @@ def test_effects_of_each_replication_are_those_of_its_frames(pooled):
 def test_pooled_effects_and_limits_follow_from_those_of_the_replications(pooled):
     for key, by_replication in table(pooled).items():
         told = by_replication.pop("pooled")
-        if told["unit"] != "percent" or not told["value"]:
+        if told["unit"] != "percent":
+            continue
+        if not all(row["value"] and row["standard_error"] for row in by_replication.values()):
+            assert [float(told["low"]), float(told["high"])] == [-100, math.inf], key
             continue
         values = np.log1p([float(row["value"]) / 100 for row in by_replication.values()])
         errors = np.array([float(row["standard_error"]) for row in by_replication.values()])

@@ -54,7 +54,7 @@ def cells():
                 yield Cell(model, init=f"scratch{end}"), COMMON, (1.5 * factor,) * 2
 
 
-def write_replication(folder, seed, spread=0.0):
+def write_replication(folder, seed, spread=0.0, networks=NETWORKS):
     """Write an archive.
 
     Args:
@@ -62,6 +62,7 @@ def write_replication(folder, seed, spread=0.0):
         seed: Draws how difficult its frames are.
         spread: Of the logarithms of factors that each cell, and each of its frames, has of its
             own; without it, ratios of cells are the same in all replications.
+        networks: Factors on the errors of the networks, by name.
     """
     rng = np.random.default_rng(seed)
     path = np.repeat(np.arange(N_PATHS), N_FRAMES // N_PATHS)
@@ -77,7 +78,7 @@ def write_replication(folder, seed, spread=0.0):
             UNITS, sizes, factors, difficulty[test_set], strict=True
         ):
             own = np.exp(spread * (rng.normal() + rng.normal(size=N_FRAMES)))
-            errors = size * factor * NETWORKS[cell.model] * hard * own
+            errors = size * factor * networks[cell.model] * hard * own
             frame[unit] = frame[f"true_{unit}"] = np.minimum(errors, FAILED).round()
         rows.append(frame)
     folder.mkdir(parents=True)
@@ -93,7 +94,7 @@ def write_replication(folder, seed, spread=0.0):
         dict.fromkeys(LABEL_ERROR_SCHEMA, 0)
         | {"scene": "large_room", "size": "6k", "method": method, "split": split}
         | {"assistance": state, "position_m_median": off_m * seed / 102}
-        | {"orientation_deg_median": 0.5}
+        | {"orientation_deg_median": 0.5, "position_m_rmse": 10 * off_m * (seed == 102)}
         for method, off_m in LABELS_OFF_M.items()
         for split in ("train", "test")
         for state in ("before", "after")
