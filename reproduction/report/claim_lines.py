@@ -252,7 +252,7 @@ def _networks(tables: ClaimTables) -> Line | None:
     judged = tables.verdict(BEST_NETWORK, "true")
     if judged is None:  # a run that was published before this was judged
         outcome = OUTCOMES[Verdict.HOLDS if best[printed] else Verdict.OPPOSITE]
-        limits = " (one run, no limits)"
+        limits = " in one run, without limits"
     elif judged[0] in OUTCOMES:
         outcome, limits = OUTCOMES[judged[0]], _beside_the_best(table, printed)
     else:
