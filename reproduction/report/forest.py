@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from reproduction.claims.tables import PERCENT, SHARE, Part, parts_in, read_claims
-from reproduction.claims.verdicts import published_claims
+from reproduction.claims.verdicts import Verdict, published_claims
 from reproduction.figures.style import BLUE, GREEN, VERMILION, Style
-from reproduction.report.claim_lines import part_label
+from reproduction.report.claim_lines import OUTCOMES, part_label
 from reproduction.report.stamped import digest, stamped_png, write_stamped
 from synfeal.errors import exit_status
 
@@ -46,9 +46,15 @@ class Forest(NamedTuple):
     verdicts: dict[str, str]
 
     def of_claims(self, claims: Collection[str]) -> Forest:
-        """Keep the changes of some claims alone."""
-        return self._replace(
-            changes=[part for part in self.changes if part.claim in claims], shares=[]
+        """Keep the changes of some claims alone, and call verdicts as the lines on claims do."""
+        return Forest(
+            changes=[part for part in self.changes if part.claim in claims],
+            shares=[],
+            verdicts={
+                claim: OUTCOMES[Verdict(verdict)].lower()
+                for claim, verdict in self.verdicts.items()
+                if verdict in OUTCOMES
+            },
         )
 
     @property
