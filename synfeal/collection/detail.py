@@ -133,8 +133,8 @@ def choose_detail(
         render: Backend and samples of the frames.
     """
     log.info(
-        "choosing a level of detail for %dx%d: smaller textures and fewer of %d faces, compared with"
-        " the full mesh in %d views",
+        "choosing a level of detail for %dx%d: smaller textures and fewer of %d faces, compared"
+        " with the full mesh in %d views",
         camera.width,
         camera.height,
         mesh.n_faces,
