@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from reproduction.claims.effects import BEST_NETWORK, Asked
+from reproduction.claims.effects import BEST_NETWORK, Asked, Effect, printed_effects
 from reproduction.claims.verdicts import DECIDED_AGAINST, ENOUGH, FEW, NOT_COPING, SMALLEST, Verdict
 
 # Claims that one thing is better than each of several others, and claims about so many things.
@@ -36,6 +36,17 @@ class Condition(NamedTuple):
     printed: float = math.nan  # the same in print, where it can be computed
     # Sets two effects against each other, of which it tells neither: no part is borne out by it.
     compares: bool = False
+
+
+def condition_of(effect: Effect, limits: Limits) -> Condition:
+    """Ask of an effect what its claim says.
+
+    Args:
+        effect: One effect of a claim.
+        limits: Its limits.
+    """
+    printed = printed_effects().get(effect[:4], math.nan)
+    return Condition(effect.asked, effect.sign, limits, printed, effect.compares)
 
 
 def percent(log_ratio: float) -> float:

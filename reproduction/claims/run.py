@@ -26,12 +26,12 @@ from reproduction.claims.effects import (
     SIZES,
     Against,
     Effect,
-    printed_effects,
 )
 from reproduction.claims.evidence import COMMON, Cell, Evidence, Missing, evidence_of
 from reproduction.claims.judge import (
     Condition,
     Limits,
+    condition_of,
     judge_claim,
     judge_few,
     judge_many,
@@ -168,12 +168,10 @@ def _judge_errors(found: RunClaims, evidence: Evidence, claim: str, against: Aga
         return
     parts = defaultdict[str, list[Condition]](list)
     for effect in asserted:
-        printed = printed_effects().get(effect[:4], math.nan)
         of_sample = partial(limits, effect.sample, own.layout)
-        parts[effect.part].append(
-            Condition(effect.asked, effect.sign, of_sample, printed, effect.compares)
-        )
-        found.rows.append(_effect_row(effect, of_sample(), printed))
+        condition = condition_of(effect, of_sample)
+        parts[effect.part].append(condition)
+        found.rows.append(_effect_row(effect, of_sample(), condition.printed))
     if claim in DESCRIBED:
         return
     verdict = judge_claim(claim, parts)

@@ -197,19 +197,31 @@ def parts_in(table: pd.DataFrame, against: Against = "true") -> list[Part]:
     wanted = table[~table["claim"].isin((*DESCRIBED, BEST_NETWORK))]
     both = wanted["claim"].isin(wanted.loc[wanted["against"] == "labels", "claim"])
     wanted = wanted[~both | (wanted["against"] == against)]
-    found = [
-        _part(values) for _, values in wanted.groupby(["claim", "part", "quantity"], sort=False)
-    ]
-    nearest = {_nearest([p for p in found if p.claim == claim]) for claim in BEST}
-    kept = [part for part in found if part.claim not in BEST or part in nearest]
-    return sorted(kept, key=lambda part: _place(part.claim))
+    several = _parts(wanted[~wanted["claim"].isin(BEST)])
+    nearest = [nearest_rival(wanted, claim) for claim in BEST]
+    found = [*several, *(part for part in nearest if part is not None)]
+    return sorted(found, key=lambda part: _place(part.claim))
 
 
-def _nearest(rivals: Sequence[Part]) -> Part | None:
-    """Pick the rival that decides: the one that is surest to be better, else the nearest."""
+def nearest_rival(effects: pd.DataFrame, claim: str) -> Part | None:
+    """Pick the rival that decides: the one that is surest to be better, else the nearest.
+
+    Args:
+        effects: ``claim_effects.csv``.
+        claim: A claim that one thing is better than each of its rivals.
+
+    Returns:
+        None where the claim has no effects.
+    """
+    rivals = _parts(effects[effects["claim"] == claim])
     better = [part for part in rivals if part.decided[1] > 0]
     end = 1 if better else 2
     return max(better or rivals, key=lambda part: part.decided[end], default=None)
+
+
+def _parts(effects: pd.DataFrame) -> list[Part]:
+    by_part = effects.groupby(["claim", "part", "quantity"], sort=False)
+    return [_part(values) for _, values in by_part]
 
 
 def _part(values: pd.DataFrame) -> Part:

@@ -21,14 +21,7 @@ import numpy as np
 import pandas as pd
 
 from reproduction.claims.effects import OWN, Against
-from reproduction.claims.evidence import (
-    COMMON,
-    SCORES,
-    Cell,
-    Evidence,
-    cell_of,
-    evidence_of,
-)
+from reproduction.claims.evidence import COMMON, SCORES, Cell, Evidence, cell_of, evidence_of
 from reproduction.config.profile import Config
 from reproduction.design.experiments import Design, Run, read_design
 from reproduction.design.files import SPLITS, Files

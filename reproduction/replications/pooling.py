@@ -17,11 +17,11 @@ from reproduction.claims.effects import (
     Against,
     Effect,
     effects_of,
-    printed_effects,
 )
 from reproduction.claims.judge import (
     Condition,
     Limits,
+    condition_of,
     judge_claim,
     judge_few,
     judge_many,
@@ -97,23 +97,22 @@ def write_pooled(folders: Sequence[Path], out: Path) -> None:
     rows: list[Row] = []
     by_claim = defaultdict[Keys, dict[str, list[Condition]]](dict)
     for key, effects in _by_key(archives).items():
-        part, printed = _part(effects), printed_effects().get(key, math.nan)
-        rows += _effect_rows(key, part, printed, dict(zip(seeds, effects, strict=True)))
-        first = effects[0]
-        condition = Condition(first.asked, first.sign, part.limits, printed, first.compares)
-        by_claim[key[0], key[3]].setdefault(first.part, []).append(condition)
+        part = _part(effects)
+        condition = condition_of(effects[0], part.limits)
+        rows += _effect_rows(key, part, condition.printed, dict(zip(seeds, effects, strict=True)))
+        by_claim[key[0], key[3]].setdefault(effects[0].part, []).append(condition)
     verdicts: dict[Keys, Verdict] = {
         keys: judge_claim(keys[0], parts)
         for keys, parts in by_claim.items()
         if keys[0] not in DESCRIBED
     }
     counts = {
-        method: [archive.batches_of(method) for archive in archives.values()]
+        method: {seed: archive.batches_of(method) for seed, archive in archives.items()}
         for method in (*RIVALS, KINECT_FUSION)
     }
-    shares = {method: odds_of(of_method) for method, of_method in counts.items()}
-    for method, of_method in counts.items():
-        rows += _share_rows(method, dict(zip(seeds, of_method, strict=True)))
+    shares = {method: odds_of(list(by_seed.values())) for method, by_seed in counts.items()}
+    for method, by_seed in counts.items():
+        rows += _share_rows(method, by_seed, shares[method])
     verdicts["C4", ""] = judge_few({method: limits_of(shares[method]) for method in RIVALS})
     verdicts["C15", ""] = judge_many(limits_of(shares[KINECT_FUSION]))
     out.mkdir(parents=True, exist_ok=True)
@@ -226,9 +225,10 @@ def limits_of(shares: Shares) -> Limits:
     return limits_at
 
 
-def _share_rows(method: str, counts: Mapping[str, tuple[int, int]]) -> Iterator[Row]:
+def _share_rows(
+    method: str, counts: Mapping[str, tuple[int, int]], shares: Shares
+) -> Iterator[Row]:
     """Yield the shares of assisted batches by replication, and their pooled one."""
-    shares = odds_of(list(counts.values()))
     assisted = PUBLISHED_ASSISTED.get(method)
     same: dict[str, object] = {
         "claim": "C15" if method == KINECT_FUSION else "C4",

@@ -14,13 +14,7 @@ from typing import NamedTuple
 import pandas as pd
 from scipy.stats import spearmanr
 
-from reproduction.claims.effects import (
-    BEST_NETWORK,
-    NETWORKS,
-    PAPERS_FIVE,
-    Against,
-    Asked,
-)
+from reproduction.claims.effects import BEST_NETWORK, NETWORKS, PAPERS_FIVE, Against, Asked
 from reproduction.claims.evidence import QUANTITIES
 from reproduction.claims.tables import (
     PERCENT,
@@ -30,6 +24,7 @@ from reproduction.claims.tables import (
     ClaimTables,
     Part,
     deciding_rows,
+    nearest_rival,
     parts_in,
     turned_percent,
 )
@@ -272,13 +267,11 @@ def _networks(tables: ClaimTables) -> Line | None:
 
 def _beside_the_best(effects: pd.DataFrame, printed: str) -> str:
     """Tell the network that is best in print beside the surest to be better, else the nearest."""
-    rivals = effects[effects["claim"] == BEST_NETWORK]["part"].unique()
-    rows = {r: deciding_rows(effects, BEST_NETWORK, r, "true")["position"] for r in rivals}
-    end = "low" if any(float(row["low"]) > 0 for row in rows.values()) else "high"
-    rival, row = max(rows.items(), key=lambda item: float(item[1][end]))
-    ends = (1 + float(row[name]) / 100 for name in ("value", "low", "high"))
-    other = TITLES[rival.removeprefix(RIVAL)]
-    return f"; {TITLES[printed]}'s is {_change(*ends)} beside {other}'s"
+    rival = nearest_rival(effects, BEST_NETWORK)
+    if rival is None:
+        return ""
+    other = TITLES[rival.label.removeprefix(RIVAL).partition(",")[0]]
+    return f"; {TITLES[printed]}'s is {part_text(rival)} beside {other}'s"
 
 
 def networks_beside_print(effects: pd.DataFrame) -> str:
