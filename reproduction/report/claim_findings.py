@@ -148,8 +148,8 @@ def label_errors_are_small(folder: Path) -> Finding | None:
         "the truth",
         folder / LABEL_ERRORS,
         f"Labels that SfM and RGB-D SLAM give these renderings for training are {off_cm} cm off in"
-        f" the median, the networks {networks_cm} cm; limits of what exact labels change in the"
-        f" networks' mean errors reach from {lowest} to {highest}.",
+        f" the median, the networks {networks_cm} cm; exact labels instead change the networks'"
+        f" mean errors by something between {lowest} and {highest}.",
     )
 
 

@@ -34,13 +34,14 @@ from reproduction.tables.layouts import SOURCES, TITLES, scene_title
 from reproduction.tables.sheet import markdown_table
 
 # How a line about claims with a verdict begins. What is surely less than printed may be nothing.
+REPRODUCED, IN_PART = "Reproduced", "Reproduced in part"
 LESS, NOT_SEEN, UNDECIDED = "Smaller than printed", "Not seen", "Undecided"
-PERHAPS_NONE = f"{LESS}, perhaps none"
+PERHAPS_NONE = f"{LESS}, if there at all"
 OUTCOMES = {
-    Verdict.HOLDS: "Reproduced",
+    Verdict.HOLDS: REPRODUCED,
     Verdict.SMALLER: LESS,
     Verdict.LESS: LESS,
-    Verdict.MIXED: "In part",
+    Verdict.MIXED: IN_PART,
     Verdict.NEGLIGIBLE: NOT_SEEN,
     Verdict.OPPOSITE: "Not reproduced",
     Verdict.REFUTED: "Not reproduced",
@@ -99,15 +100,14 @@ TOPICS = (
         "noisy labels do harm",
         (
             Told(
-                "labels moved by 0.52 m (0.30 m in the paper's unit) and turned by 20°, PoseNet2,"
-                " against the true poses",
+                "the strongest noise of Table 3, PoseNet2, scored against the true poses",
                 "C6",
                 "no noise, not the most",
                 turned=True,
                 in_print=False,
             ),
             Told(
-                "against equally noisy test labels, as in print",
+                "scored against equally noisy test labels, as in print",
                 "C6",
                 "no noise, not the most",
                 "labels",
@@ -119,13 +119,13 @@ TOPICS = (
         "better labels, better networks",
         (
             Told(
-                "the simulator's labels instead of SfM's, PoseNet2, against the true poses",
+                "the simulator's labels instead of SfM's, PoseNet2, scored against the true poses",
                 "C2",
                 "exact labels, not sfm",
                 in_print=False,
             ),
             Told(
-                "against the labels of the test set, as in print",
+                "scored against each method's own test labels, as in print",
                 "C2",
                 "exact labels, not sfm",
                 "labels",
@@ -135,7 +135,11 @@ TOPICS = (
     Topic(
         "transfer learning",
         (
-            Told("from scratch, mean of the five networks, 6k", "C10", "from scratch, 6k"),
+            Told(
+                "from scratch instead of pretrained, mean of the five networks, 6k",
+                "C10",
+                "from scratch, 6k",
+            ),
             Told("20k", "C10", "from scratch, 20k"),
         ),
         "direction",
@@ -145,8 +149,9 @@ TOPICS = (
 
 # What is sure of effects that leave a claim undecided.
 AS_CLAIMED = {
-    "size": "All surely in the paper's direction; whether by two thirds of its size is open.",
-    "direction": f"All surely in the paper's direction; whether by {SMALLEST:.0f} % each is open.",
+    "size": "All surely in the paper's direction, but not surely by two thirds of its size.",
+    "direction": "All surely in the paper's direction, but not all surely by the"
+    f" {SMALLEST:.0f} % asked for.",
 }
 # Claims that the lines are about.
 TOLD_CLAIMS = frozenset(told.claim for topic in TOPICS for told in topic.effects)
@@ -178,18 +183,32 @@ def _line(topic: Topic, tables: ClaimTables) -> Line | None:
     if not tested:
         return None
     changes = [_decided(own, tables.effects) for own, _ in tested]
-    outcomes = dict.fromkeys(
+    outcomes = [
         PERHAPS_NONE if outcome == LESS and _may_be_none(both) else outcome
         for (_, outcome), both in zip(tested, changes, strict=True)
-    )
+    ]
     told = "; ".join(
-        f"{own.name}: {_changes(own, both)}" for (own, _), both in zip(tested, changes, strict=True)
+        f"{own.name}{_unless_shared(outcome, outcomes)}: {_changes(own, both)}"
+        for (own, _), outcome, both in zip(tested, outcomes, changes, strict=True)
     )
     open_text = ""
-    if [*outcomes] == [UNDECIDED] and all(_is_as_claimed(*own) for both in changes for own in both):
+    if {*outcomes} == {UNDECIDED} and all(_is_as_claimed(*own) for both in changes for own in both):
         open_text = f" {AS_CLAIMED[topic.asked]}"
     text = f"{told[0].upper()}{told[1:]}.{open_text}"
-    return Line(f"{' / '.join(outcomes)}: {topic.topic}", text)
+    return Line(f"{_together(outcomes)}: {topic.topic}", text)
+
+
+def _together(outcomes: Sequence[str]) -> str:
+    """Name in a heading what the effects of a topic came to, which may be different things."""
+    different = dict.fromkeys(outcomes)
+    if len(different) > 1 and REPRODUCED in different:
+        return IN_PART
+    return LESS if {*different} == {LESS, PERHAPS_NONE} else " / ".join(different)
+
+
+def _unless_shared(outcome: str, outcomes: Sequence[str]) -> str:
+    """Name what one effect came to in brackets, unless all came to the same."""
+    return f" ({outcome.lower()})" if len({*outcomes}) > 1 else ""
 
 
 def _may_be_none(both: Sequence[tuple[Interval, float]]) -> bool:
@@ -271,7 +290,7 @@ def _beside_the_best(effects: pd.DataFrame, printed: str) -> str:
     if rival is None:
         return ""
     other = TITLES[rival.label.removeprefix(RIVAL).partition(",")[0]]
-    return f"; {TITLES[printed]}'s is {part_text(rival)} beside {other}'s"
+    return f"; {TITLES[printed]}'s differs from {other}'s by {part_text(rival)}"
 
 
 def networks_beside_print(effects: pd.DataFrame) -> str:

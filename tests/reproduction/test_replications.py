@@ -155,13 +155,15 @@ def test_lines_follow_the_verdicts(pooled, tmp_path):
     judged.loc[judged["claim"] == "C2", "verdict"] = "smaller than published"
     judged.to_csv(tmp_path / CLAIMS, index=False)
     size, _, _, labels, start = lines_of(tmp_path)
-    assert size.startswith("- **Reproduced / Undecided: ")
+    assert size.startswith("- **Reproduced in part: ")
+    assert "networks (reproduced): −50 %" in size
+    assert "to 95k (undecided): −72 %" in size
     assert start.startswith("- **Not reproduced: ")
     assert labels.startswith("- **Smaller than printed: ")
     effects = pd.read_csv(tmp_path / EFFECTS)
     effects.loc[effects["claim"] == "C2", ["low", "high"]] = [-60, 5]
     effects.to_csv(tmp_path / EFFECTS, index=False)
-    assert lines_of(tmp_path)[3].startswith("- **Smaller than printed, perhaps none: ")
+    assert lines_of(tmp_path)[3].startswith("- **Smaller than printed, if there at all: ")
     judged.loc[judged["claim"] == "C2", "verdict"] = "negligible"
     judged.to_csv(tmp_path / CLAIMS, index=False)
     assert lines_of(tmp_path)[3].startswith("- **Not seen: ")
@@ -174,19 +176,19 @@ def test_lines_follow_the_verdicts(pooled, tmp_path):
             [(1.0, 1.1, 1.25, 1.05, 0.9)] * 3,
             "Reproduced",
             "PoseNet2's in 3 of 3 replications",
-            "−10 % (−10 to −10 %) beside PoseNet's",
+            "differs from PoseNet's by −10 % (−10 to −10 %)",
         ),
         (
             [(0.8, 1.1, 1.25, 1.05, 1.0)] * 3,
             "Not reproduced",
             "PoseNet's in 3 of 3 replications",
-            "+25 % (+25 to +25 %) beside PoseNet's",
+            "differs from PoseNet's by +25 % (+25 to +25 %)",
         ),
         (
             [(0.5, 1.1, 1.2, 1.3, 1), (1, 1.1, 1.2, 1.3, 0.5), (0.5, 1.1, 1.2, 1.3, 1)],
             "Undecided",
             "PoseNet's in 2 of 3 replications, PoseNet2's in 1 of 3 replications",
-            "beside PoseNet's",
+            "differs from PoseNet's by",
         ),
     ],
 )
@@ -200,8 +202,8 @@ def test_the_line_on_networks_counts_replications(tmp_path, networks, begins, na
     write_pooled(folders, tmp_path)
     line = lines_of(tmp_path)[2]
     assert line.startswith(f"- **{begins}: which network is best.** ")
-    assert f"The lowest position error is {names}; PoseNet2's is " in line
-    assert f"{beside} (paper: PoseNet2's)." in line
+    assert f"The lowest position error is {names}; PoseNet2's {beside}" in line
+    assert line.split(". Rank")[0].endswith(" (paper: PoseNet2's)")
 
 
 def test_a_network_that_noise_makes_fail_is_told_as_one(pooled, tmp_path):
@@ -244,7 +246,9 @@ def test_an_effect_that_is_sure_but_small_is_told_as_one(pooled, tmp_path, low, 
     effects.to_csv(tmp_path / EFFECTS, index=False)
     line = lines_of(tmp_path)[4]
     assert line.startswith("- **Undecided: transfer learning.** ")
-    assert ("All surely in the paper's direction; whether by 5 % each is open." in line) == said
+    assert (
+        "All surely in the paper's direction, but not all surely by the 5 % asked for." in line
+    ) == said
 
 
 def test_what_is_open_of_a_size_is_two_thirds_of_it_and_of_the_other_direction_nothing(
@@ -261,7 +265,7 @@ def test_what_is_open_of_a_size_is_two_thirds_of_it_and_of_the_other_direction_n
     effects.loc[effects["claim"] == "C10", ["value", "low", "high"]] = [-9.0, -14.0, -3.0]
     effects.to_csv(tmp_path / EFFECTS, index=False)
     lines = lines_of(tmp_path)
-    assert "whether by two thirds of its size is open." in lines[0]
+    assert "but not surely by two thirds of its size." in lines[0]
     assert "in the paper's direction" not in lines[4]
 
 
