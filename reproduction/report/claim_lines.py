@@ -147,11 +147,10 @@ TOPICS = (
 )
 
 
-# What is sure of effects that leave a claim undecided.
-AS_CLAIMED = {
-    "size": "All surely in the paper's direction, but not surely by two thirds of its size.",
-    "direction": "All surely in the paper's direction, but not all surely by the"
-    f" {SMALLEST:.0f} % asked for.",
+# How large an effect has to be surely, for a claim about it to hold.
+ASKED_FOR = {
+    "size": "two thirds of the printed size",
+    "direction": f"the {SMALLEST:.0f} % asked for",
 }
 # Claims that the lines are about.
 TOLD_CLAIMS = frozenset(told.claim for topic in TOPICS for told in topic.effects)
@@ -193,7 +192,8 @@ def _line(topic: Topic, tables: ClaimTables) -> Line | None:
     )
     open_text = ""
     if {*outcomes} == {UNDECIDED} and all(_is_as_claimed(*own) for both in changes for own in both):
-        open_text = f" {AS_CLAIMED[topic.asked]}"
+        bound = ASKED_FOR[topic.asked]
+        open_text = f" All surely in the paper's direction, but not all surely by {bound}."
     text = f"{told[0].upper()}{told[1:]}.{open_text}"
     return Line(f"{_together(outcomes)}: {topic.topic}", text)
 
