@@ -117,6 +117,32 @@ def test_the_forest_plot_shows_the_factors_and_the_nearest_rival(pooled):
     assert not any(claim == "networks" for claim, _ in rows)
 
 
+@pytest.fixture
+def copied(pooled, tmp_path):
+    """A folder with the effects and verdicts of the pooled replications, to be altered."""
+    for name in (EFFECTS, CLAIMS):
+        shutil.copy(pooled / name, tmp_path / name)
+    return tmp_path
+
+
+def judge(folder, **verdicts):
+    """Write verdicts by the names of their claims."""
+    judged = pd.read_csv(folder / CLAIMS)
+    for claim, verdict in verdicts.items():
+        judged.loc[judged["claim"] == claim, "verdict"] = verdict
+    judged.to_csv(folder / CLAIMS, index=False)
+
+
+def alter_effects(folder, claim, to, **only):
+    """Write columns of a claim's effects, of those rows alone whose columns are as in `only`."""
+    effects = pd.read_csv(folder / EFFECTS)
+    own = effects["claim"] == claim
+    for column, value in only.items():
+        own &= effects[column] == value
+    effects.loc[own, [*to]] = [*to.values()]
+    effects.to_csv(folder / EFFECTS, index=False)
+
+
 def lines_of(folder):
     return as_markdown(claim_lines(read_claims(folder))).splitlines()
 
@@ -145,41 +171,24 @@ def test_lines_tell_the_factors_and_begin_with_the_verdict(pooled):
     assert re.findall(r"([+−]\d+) % \(", start) == ["+50", "+50", "+30", "+30"]
 
 
-def test_lines_follow_the_verdicts(pooled, tmp_path):
-    for name in (EFFECTS, CLAIMS):
-        shutil.copy(pooled / name, tmp_path / name)
-    judged = pd.read_csv(tmp_path / CLAIMS)
-    judged.loc[judged["claim"] == "C8", "verdict"] = "undecided"
-    judged.loc[judged["claim"] == "C10", "verdict"] = "opposite"
-    judged.to_csv(tmp_path / CLAIMS, index=False)
-    judged.loc[judged["claim"] == "C2", "verdict"] = "smaller than published"
-    judged.to_csv(tmp_path / CLAIMS, index=False)
-    size, _, _, labels, start = lines_of(tmp_path)
+def test_lines_follow_the_verdicts(copied):
+    judge(copied, C8="undecided", C10="opposite", C2="smaller than published")
+    size, _, _, labels, start = lines_of(copied)
     assert size.startswith("- **Reproduced in part: ")
     assert "networks (reproduced): −50 %" in size
     assert "to 95k (undecided): −72 %" in size
     assert start.startswith("- **Not reproduced: ")
     assert labels.startswith("- **Smaller than printed: ")
-    effects = pd.read_csv(tmp_path / EFFECTS)
-    effects.loc[effects["claim"] == "C2", ["low", "high"]] = [-60, 5]
-    effects.to_csv(tmp_path / EFFECTS, index=False)
-    assert lines_of(tmp_path)[3].startswith("- **Smaller than printed, if there at all: ")
-    judged.loc[judged["claim"] == "C2", "verdict"] = "negligible"
-    judged.to_csv(tmp_path / CLAIMS, index=False)
-    assert lines_of(tmp_path)[3].startswith("- **Not seen: ")
+    alter_effects(copied, "C2", {"low": -60, "high": 5})
+    assert lines_of(copied)[3].startswith("- **Smaller than printed, if there at all: ")
+    judge(copied, C2="negligible")
+    assert lines_of(copied)[3].startswith("- **Not seen: ")
 
 
-def test_effects_that_are_all_smaller_than_printed_share_a_heading(pooled, tmp_path):
-    for name in (EFFECTS, CLAIMS):
-        shutil.copy(pooled / name, tmp_path / name)
-    judged = pd.read_csv(tmp_path / CLAIMS)
-    judged.loc[judged["claim"] == "C6", "verdict"] = "smaller than published"
-    judged.to_csv(tmp_path / CLAIMS, index=False)
-    effects = pd.read_csv(tmp_path / EFFECTS)
-    own = (effects["claim"] == "C6") & (effects["against"] == "true")
-    effects.loc[own, ["low", "high"]] = [-70, 5]
-    effects.to_csv(tmp_path / EFFECTS, index=False)
-    noise = lines_of(tmp_path)[1]
+def test_effects_that_are_all_smaller_than_printed_share_a_heading(copied):
+    judge(copied, C6="smaller than published")
+    alter_effects(copied, "C6", {"low": -70, "high": 5}, against="true")
+    noise = lines_of(copied)[1]
     assert noise.startswith("- **Smaller than printed: noisy labels do harm.** ")
     assert "true poses (smaller than printed, if there at all): " in noise
     assert "as in print (smaller than printed): " in noise
@@ -222,18 +231,13 @@ def test_the_line_on_networks_counts_replications(tmp_path, networks, begins, na
     assert re.search(rf"{said}( \S+ % \([^)]*\))? \(paper: PoseNet2's\)\.", line)
 
 
-def test_a_network_that_noise_makes_fail_is_told_as_one(pooled, tmp_path):
-    for name in (EFFECTS, CLAIMS):
-        shutil.copy(pooled / name, tmp_path / name)
-    effects = pd.read_csv(tmp_path / EFFECTS)
-    own = (effects.claim == "C6") & (effects.quantity == "position")
-    effects.loc[own, ["value", "low", "high"]] = [-100.0, -100.0, math.inf]
-    effects.to_csv(tmp_path / EFFECTS, index=False)
-    assert "unknown in position" in lines_of(tmp_path)[1]
-    assert "the most noise instead of none: position unknown" in claims_beside_print(
-        read_claims(tmp_path)
-    )
-    assert main([str(tmp_path)]) == 0  # the figure
+def test_a_network_that_noise_makes_fail_is_told_as_one(copied):
+    failed = {"value": -100.0, "low": -100.0, "high": math.inf}
+    alter_effects(copied, "C6", failed, quantity="position")
+    assert "unknown in position" in lines_of(copied)[1]
+    told = claims_beside_print(read_claims(copied))
+    assert "the most noise instead of none: position unknown" in told
+    assert main([str(copied)]) == 0  # the figure
 
 
 def test_learning_curves_that_do_not_fall_leave_training_longer_unknown(tmp_path):
@@ -251,36 +255,22 @@ def test_learning_curves_that_do_not_fall_leave_training_longer_unknown(tmp_path
 
 
 @pytest.mark.parametrize(("low", "said"), [(2.0, True), (-2.0, False)])
-def test_an_effect_that_is_sure_but_small_is_told_as_one(pooled, tmp_path, low, said):
-    for name in (EFFECTS, CLAIMS):
-        shutil.copy(pooled / name, tmp_path / name)
-    judged = pd.read_csv(tmp_path / CLAIMS)
-    judged.loc[judged["claim"] == "C10", "verdict"] = "undecided"
-    judged.to_csv(tmp_path / CLAIMS, index=False)
-    effects = pd.read_csv(tmp_path / EFFECTS)
-    effects.loc[effects["claim"] == "C10", ["value", "low", "high"]] = [6.0, low, 10.0]
-    effects.to_csv(tmp_path / EFFECTS, index=False)
-    line = lines_of(tmp_path)[4]
+def test_an_effect_that_is_sure_but_small_is_told_as_one(copied, low, said):
+    judge(copied, C10="undecided")
+    alter_effects(copied, "C10", {"value": 6.0, "low": low, "high": 10.0})
+    line = lines_of(copied)[4]
     assert line.startswith("- **Undecided: transfer learning.** ")
     assert (
         "All surely in the paper's direction, but not all surely by the 5 % asked for." in line
     ) == said
 
 
-def test_what_is_open_of_a_size_is_two_thirds_of_it_and_of_the_other_direction_nothing(
-    pooled, tmp_path
-):
-    for name in (EFFECTS, CLAIMS):
-        shutil.copy(pooled / name, tmp_path / name)
-    judged = pd.read_csv(tmp_path / CLAIMS)
-    judged.loc[judged["claim"].isin(["C7", "C8", "C10"]), "verdict"] = "undecided"
-    judged.to_csv(tmp_path / CLAIMS, index=False)
-    effects = pd.read_csv(tmp_path / EFFECTS)
-    own = effects["claim"].isin(["C7", "C8"])
-    effects.loc[own, ["value", "low", "high"]] = [-38.0, -45.0, -30.0]
-    effects.loc[effects["claim"] == "C10", ["value", "low", "high"]] = [-9.0, -14.0, -3.0]
-    effects.to_csv(tmp_path / EFFECTS, index=False)
-    lines = lines_of(tmp_path)
+def test_what_is_open_of_a_size_is_two_thirds_of_it_and_of_the_other_direction_nothing(copied):
+    judge(copied, C7="undecided", C8="undecided", C10="undecided")
+    for claim in ("C7", "C8"):
+        alter_effects(copied, claim, {"value": -38.0, "low": -45.0, "high": -30.0})
+    alter_effects(copied, "C10", {"value": -9.0, "low": -14.0, "high": -3.0})
+    lines = lines_of(copied)
     assert "but not all surely by two thirds of the printed size." in lines[0]
     assert "in the paper's direction" not in lines[4]
 
