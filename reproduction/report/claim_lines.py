@@ -264,12 +264,7 @@ def _networks(tables: ClaimTables) -> Line | None:
     (printed,) = {str(group["printed"].idxmin()) for group in by_replication}
     best = Counter(str(group["value"].idxmin()) for group in by_replication)
     judged = tables.verdict(BEST_NETWORK, "true")
-    if judged is None:  # a run that was published before this was judged
-        outcome = OUTCOMES[Verdict.HOLDS if best[printed] else Verdict.OPPOSITE]
-        limits = " in one run, without limits"
-    elif judged[0] in OUTCOMES:
-        outcome, limits = OUTCOMES[judged[0]], _beside_the_best(table, printed)
-    else:
+    if judged is None or judged[0] not in OUTCOMES:
         return None
     several = len(found) > 1
     names = ", ".join(
@@ -278,9 +273,10 @@ def _networks(tables: ClaimTables) -> Line | None:
     )
     over = ", mean and range over the replications" if several else ""
     return Line(
-        f"{outcome}: which network is best",
-        f"The lowest position error is {names}{limits} (paper: {TITLES[printed]}'s). Rank"
-        f" correlation with the paper among the five{over}: {', '.join(parts)}.",
+        f"{OUTCOMES[judged[0]]}: which network is best",
+        f"The lowest position error is {names}{_beside_the_best(table, printed)} (paper:"
+        f" {TITLES[printed]}'s). Rank correlation with the paper among the five{over}:"
+        f" {', '.join(parts)}.",
     )
 
 

@@ -11,6 +11,7 @@ import argparse
 import math
 import sys
 from collections.abc import Collection, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,6 +31,8 @@ REMEDY = "pool the replications again: python -m reproduction.replications pool"
 COLORS = {"position": BLUE, "orientation": VERMILION}
 TICKS_PERCENT = (-80, -50, 0, 100, 300)
 ROW_INCHES = 0.29
+LEAST_ROWS = 2  # of a claim, whose title and verdict are two lines
+TICKS_BELOW = 0.27  # rows; where limits are narrow, replications would hide under the pooled value
 
 
 class Forest(NamedTuple):
@@ -96,7 +99,7 @@ def forest_figure(forest: Forest) -> Figure:
     """Draw a row for each part: replications as ticks, the pooled value with limits, print."""
     changes, shares, verdicts = forest
     blocks = [rows for rows in (changes, shares) if rows]
-    heights = [len(rows) + 1.5 for rows in blocks]
+    heights = [_places(rows)[1] + 1.5 for rows in blocks]
     figure = Figure(figsize=(9.5, ROW_INCHES * sum(heights) + 1.0), layout="constrained")
     above, *below = figure.subplots(len(blocks), 1, height_ratios=heights, squeeze=False)[:, 0]
     _draw_rows(above, [_as_ratios(row) for row in changes])
@@ -133,21 +136,33 @@ def _as_ratios(row: Part) -> Part:
     )
 
 
+def _places(rows: Sequence[Part]) -> tuple[list[int], int]:
+    """Place rows below each other; return where each is, and how many places there are."""
+    places, end = [], 0
+    for _, of_claim in groupby(rows, key=lambda row: row.claim):
+        start = end
+        places += [start + n for n, _ in enumerate(of_claim)]
+        end = max(places[-1] + 1, start + LEAST_ROWS)
+    return places, end
+
+
 def _draw_rows(axes: Axes, rows: Sequence[Part]) -> None:
-    for y, row in enumerate(rows):
+    places, end = _places(rows)
+    for y, row in zip(places, rows, strict=True):
         color = COLORS.get(row.quantity, GREEN)
         value, low, high = row.decided
-        axes.plot(row.single, [y] * len(row.single), "|", color=color, ms=7, mew=0.9, zorder=2)
+        below = [y + TICKS_BELOW] * len(row.single)
+        axes.plot(row.single, below, "|", color=color, ms=4.5, mew=0.9, zorder=2)
         axes.plot([low, high], [y, y], color=color, lw=2.2, solid_capstyle="butt", zorder=2)
         name = row.quantity if row.quantity in COLORS else "other"
         told = "pooled" if row.single else "ours"
-        decided: Style = {"color": color, "ms": 5.5, "mec": "white", "mew": 0.7, "zorder": 3}
+        decided: Style = {"color": color, "ms": 4, "mec": "white", "mew": 0.5, "zorder": 3}
         axes.plot(value, y, "o", label=f"{name}, {told}", **decided)
         if math.isfinite(row.printed):
             printed: Style = {"mfc": "white", "mec": "0.25", "mew": 1.1, "ms": 5.5, "zorder": 4}
             axes.plot(row.printed, y, "D", label="the paper", **printed)
-    axes.set_yticks(range(len(rows)), [part_label(row) for row in rows])
-    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_yticks(places, [part_label(row) for row in rows])
+    axes.set_ylim(end - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="x", color="0.92")
     axes.spines["left"].set_visible(False)
@@ -157,7 +172,7 @@ def _name_claims(axes: Axes, rows: Sequence[Part], verdicts: dict[str, str]) -> 
     """Write each claim with its verdict beside its first row, and rule a line above it."""
     titles = {claim.id: claim.title for claim in published_claims()}
     before = None
-    for y, row in enumerate(rows):
+    for y, row in zip(_places(rows)[0], rows, strict=True):
         if row.claim != before:
             axes.annotate(
                 f"{row.claim}: {titles[row.claim]}\n{verdicts.get(row.claim, 'not judged')}",

@@ -32,7 +32,7 @@ from reproduction.report.claim_lines import (
 from reproduction.report.findings import Finding, can_tell, findings, sentences, short_sentences
 from reproduction.report.findings_figure import is_drawn_from, panels, write_findings_figure
 from reproduction.report.forest import read_forest, write_forest
-from reproduction.report.paper_cells import TABLES, best_known_cells, paper_cells
+from reproduction.report.paper_cells import TABLES, best_known_cells
 from reproduction.report.paper_figure import cells_digest, paper_picture
 from reproduction.report.paper_tables import (
     cells_beside_print,
@@ -41,7 +41,7 @@ from reproduction.report.paper_tables import (
     meshes_beside_print,
     pooled_beside_print,
 )
-from reproduction.report.published import claims_folder, headline, read_table
+from reproduction.report.published import headline, read_table
 from reproduction.report.stamped import shows, write_stamped
 from reproduction.runs.published import PUBLISHED, REAL, REPLICATIONS
 from reproduction.runs.results import read_result
@@ -68,7 +68,7 @@ FOREST_FIGURE, EFFECTS_FIGURE = Path("docs/images/claims.png"), Path("docs/image
 PAPER_FRAMES = 6000  # of the smallest set of each room
 LIMITS_NOTE = (
     "Brackets hold 95 % limits. Findings 1 to 3 are of one run, `night`, with limits over its test"
-    " paths and training runs; the others have the limits that claims are judged by."
+    " paths and training runs; the others are of the replications, with limits over them."
 )
 SIFT = dict.fromkeys(
     ("covered_share_mean", "covered_share_q10", "covered_share_q90", "keypoints_mean"), NUMBER
@@ -92,7 +92,7 @@ def found(root: Path) -> str:
 
 def _found(root: Path) -> list[Finding]:
     of_run = findings(root) if can_tell(root) else []
-    return [*of_run, *claim_findings(claims_folder(root.parent))]
+    return [*of_run, *claim_findings(root.with_name(REPLICATIONS))]
 
 
 def _numbered(texts: Sequence[str]) -> str:
@@ -138,11 +138,11 @@ def verdicts(root: Path) -> str:
 
 
 def _claims_beside(root: Path) -> ClaimTables:
-    return read_claims(claims_folder(root.parent))
+    return read_claims(root.with_name(REPLICATIONS))
 
 
 def pooled(root: Path, name: str) -> str:
-    """Tell a table by the pooled replications, which lie beside the run; nothing before."""
+    """Tell a table by the pooled replications, which lie beside the run."""
     return pooled_beside_print(root.with_name(REPLICATIONS), name)
 
 
@@ -156,7 +156,7 @@ PARTS: dict[str, Callable[[Path], str]] = {
     "verdicts": verdicts,
     "networks": lambda root: networks_beside_print(_claims_beside(root).effects),
     "changed": lambda root: changes_since_single_runs(root.parent),
-    "label_quality": lambda root: label_quality(claims_folder(root.parent)),
+    "label_quality": lambda root: label_quality(root.with_name(REPLICATIONS)),
     "meshes": meshes_beside_print,
     **{part: partial(cells_beside_print, name=name) for part, name in PAPERS.items()},
     **{
@@ -230,13 +230,13 @@ def stale(check: bool) -> list[Path]:
     drawn = panels(shown) if can_tell(shown) else []
     if drawn and not is_drawn_from(FIGURE, drawn):
         writers[FIGURE] = partial(write_findings_figure, drawn, FIGURE)
-    folder = claims_folder()
+    folder = PUBLISHED / REPLICATIONS
     forest = read_forest(folder)
     pictures = {FOREST_FIGURE: forest, EFFECTS_FIGURE: forest.of_claims(TOLD_CLAIMS)}
     for picture, rows in pictures.items():
         if not shows(picture, rows.digest):
             writers[picture] = partial(write_forest, rows, picture)
-    cells = best_known_cells(shown, folder) if folder.name == REPLICATIONS else paper_cells(shown)
+    cells = best_known_cells(shown, folder)
     if len(cells) and not shows(PAPER_FIGURE, cells_digest(cells)):
         content = paper_picture(cells)
         writers[PAPER_FIGURE] = partial(write_stamped, content, PAPER_FIGURE)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from baselines.config.learning import MODELS
 from reproduction.claims.levels import read_label_errors
-from reproduction.claims.tables import SHARE, Part, has_claims, parts_in, read_claims
+from reproduction.claims.tables import SHARE, Part, parts_in, read_claims
 from reproduction.plan.plan import planned_tables
 from reproduction.plan.text import duration
 from reproduction.replications.archive import ON_COMMON
@@ -71,12 +71,7 @@ def pooled_beside_print(folder: Path, name: str) -> str:
     Args:
         folder: Pooled tables.
         name: Name of the table.
-
-    Returns:
-        Nothing where replications are not pooled yet.
     """
-    if not has_claims(folder):
-        return ""
     cells = pooled_rows(folder, name).dropna(subset=["replications"])
     rows = [_row_title(name, cell) for cell in rows_of(cells)]
     table = by_localizer(cells, HEADINGS[name], rows, _pooled_cell)

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from reproduction.claims.tables import has_claims
-from reproduction.runs.published import HEADLINES, PUBLISHED, REPLICATIONS, SINGLE_RUNS
+from reproduction.runs.published import HEADLINES, PUBLISHED
 from reproduction.tables.cells import schema_of
 from synfeal.records.tables import Schema, read_frame
 
@@ -16,12 +15,6 @@ def headline(published: Path = PUBLISHED) -> Path:
     """Return the largest single run of all tables that is published."""
     found = (published / name for name in HEADLINES if (published / name).is_dir())
     return next(found, published / HEADLINES[-1])
-
-
-def claims_folder(published: Path = PUBLISHED) -> Path:
-    """Return the folder of effects and verdicts: of pooled replications, or of single runs."""
-    pooled = published / REPLICATIONS
-    return pooled if has_claims(pooled) else published / SINGLE_RUNS
 
 
 def read_table(root: Path, name: str, schema: Schema | None = None) -> pd.DataFrame:

@@ -12,5 +12,5 @@ MEASURED = (PUBLISHED / "mini", PUBLISHED / "night")
 # Scores of photographs (`make real`), which need recordings that are not ours to pass on; they lie
 # beside those of a profile, and are part of none.
 REAL = "real"
-# Archives and pooled tables; before all are pooled, the single runs that each decided claims.
+# Archives and pooled tables, by which claims are told; the single runs that decided them before.
 REPLICATIONS, SINGLE_RUNS = "replications", "single_runs"

@@ -34,7 +34,9 @@ def root(tmp_path, monkeypatch):
     """A copy of the published results of mini; the working directory is the top of the copy."""
     monkeypatch.chdir(tmp_path)
     shutil.copytree(MINI, tmp_path / PUBLISHED / "mini")
-    shutil.copytree(SINGLE_RUNS, tmp_path / PUBLISHED / "single_runs")
+    for name in ("single_runs", "replications"):
+        archives = shutil.ignore_patterns("10?")
+        shutil.copytree(MINI.with_name(name), tmp_path / PUBLISHED / name, ignore=archives)
     shutil.copytree(REPOSITORY / "results/benchmarks/scene_difficulty", tmp_path / DIFFICULTY)
     return tmp_path / PUBLISHED / "mini"
 
@@ -115,13 +117,13 @@ TABLES, SCENES = "published/mini/tables", "benchmarks/scene_difficulty"
         ("table5", f"{TABLES}/table5_from_scratch", "orientation_deg", "99.87", "99.9°"),
         ("table3", f"{TABLES}/table3_inconsistencies", "published_position_m", "6.54", "*(6.54, "),
         ("meshes", f"{TABLES}/table1_meshes", "vertices", "7654321", "| 7,654,321 *("),
-        ("label_quality", "published/single_runs/label_errors", "position_m", "0.999", "99.9 cm"),
+        ("label_quality", "published/replications/label_errors", "position_m", "0.999", "99.9 cm"),
         (
             "verdicts",
-            "published/single_runs/claims",
+            "published/replications/claims",
             "verdict",
-            "opposite",
-            "opposite / negligible",
+            "holds by construction",
+            "**holds by construction / ",
         ),
         ("difficulty", f"{SCENES}/large_room-sift", "covered_share_mean", "0.99", "| 99 % ("),
         ("difficulty", f"{SCENES}/large_room-repetition", "far_share", "0.777", "77.7 %"),
@@ -163,9 +165,9 @@ def test_unknown_parts_and_unpublished_results_are_input_errors(root):
     for name in of_the_profile | of_photographs:
         with pytest.raises(InputError, match="results/published/paper"):
             part_of(name, "paper")
-    shutil.rmtree(root.with_name("single_runs"))
+    shutil.rmtree(root.with_name("replications"))
     for name in ("reproduced", "verdicts", "label_quality", "found"):
-        with pytest.raises(InputError, match="results/published/single_runs"):
+        with pytest.raises(InputError, match="results/published/replications"):
             part_of(name, "mini")
     with pytest.raises(InputError, match="<!-- sizes mini -->: no such part"):
         part_of("sizes", "mini")

@@ -4,13 +4,14 @@ import csv
 import math
 import re
 from collections import defaultdict
-from statistics import mean
+from statistics import mean, median
 
 import pytest
 
 from tests import ROOT
 
 PUBLISHED = ROOT / "results/published"
+CLAIMS = PUBLISHED / "replications"
 MODELS = ("posenet", "poselstm", "hourglass", "posenet2resnet", "posenet2")
 KEYS = {
     "table2_ground_truth": ("labels",),
@@ -60,20 +61,14 @@ def test_every_cell_of_a_page_is_that_of_the_table(name, run):
                 assert not printed
 
 
-def claims_folder():
-    """Folder whose tables tell the claims: of pooled replications, until then of single runs."""
-    pooled = PUBLISHED / "replications"
-    return pooled if (pooled / "claims.csv").is_file() else PUBLISHED / "single_runs"
-
-
 def deciding_effects(claim, against="true"):
     """Rows that decide a claim: not those of single replications."""
     return [
         row
-        for row in rows_of(claims_folder() / "claim_effects.csv")
+        for row in rows_of(CLAIMS / "claim_effects.csv")
         if row["claim"] == claim
         and row["against"] in (against, "")
-        and row["replication"] in ("this run", "pooled")
+        and row["replication"] == "pooled"
     ]
 
 
@@ -83,7 +78,7 @@ def test_every_claim_shows_its_effects_and_verdicts():
     claims = {line.split(" | ")[0].strip("| "): line.split(" | ") for line in lines}
     assert [*claims] == [f"C{n}" for n in range(1, 17)]
     verdicts = defaultdict(dict)
-    for row in rows_of(claims_folder() / "claims.csv"):
+    for row in rows_of(CLAIMS / "claims.csv"):
         verdicts[row["claim"]][row["against"]] = row["verdict"]
     for claim, (*_, told, verdict) in claims.items():
         expected = [
@@ -102,6 +97,24 @@ def test_every_claim_shows_its_effects_and_verdicts():
             assert sorted(found) == pytest.approx(sorted(expected), abs=0.501), claim
         for one in verdicts[claim].values():
             assert one in verdict
+
+
+def test_the_rules_page_tells_the_verdicts_of_the_table():
+    text = (ROOT / "docs/rules.md").read_text().split("### Result")[1].split("\n## ")[0]
+    told = {}
+    for line in text.splitlines():
+        if line.startswith("- *"):
+            heading, _, rest = line.removeprefix("- *").partition("*: ")
+            told |= dict.fromkeys(re.findall(r"\bC\d+", rest.partition(".")[0]), heading.lower())
+    found = defaultdict(set)
+    for row in rows_of(CLAIMS / "claims.csv"):
+        found[row["claim"]].add(row["verdict"])
+    assert found.pop("best network") == {"refuted"}
+    assert found.pop("C16") == {"holds by construction"}
+    assert {*told} == {*found}
+    for claim, verdicts in found.items():
+        (verdict,) = verdicts  # the same against the labels and against the truth
+        assert verdict.removesuffix(" here") in re.split(", or | or ", told[claim]), claim
 
 
 def percents(claim, part, against="true", turned=False):
@@ -138,7 +151,7 @@ def test_the_first_lines_of_the_readme_follow_from_the_tables():
     assert told(start.split(" All surely in")[0]) == pytest.approx(expected, abs=0.51)
 
     by_replication = defaultdict(lambda: defaultdict(dict))
-    for row in rows_of(claims_folder() / "claim_effects.csv"):
+    for row in rows_of(CLAIMS / "claim_effects.csv"):
         if row["claim"] == "networks" and row["replication"] != "pooled":
             pair = float(row["printed"]), float(row["value"])
             by_replication[row["quantity"]][row["replication"]][row["part"]] = pair
@@ -188,3 +201,35 @@ def rank_correlation(first, second):
     return sum(x * y for x, y in zip(a, b, strict=True)) / math.sqrt(
         sum(x * x for x in a) * sum(y * y for y in b)
     )
+
+
+@pytest.mark.parametrize(
+    ("title", "place"),
+    [("corridor", "corridor"), ("desk", "freiburg1_rpy"), ("kitchen", "RedKitchen")],
+)
+def test_photographs_in_the_readme_are_those_that_were_measured(title, place):
+    (line,) = (
+        line
+        for line in (ROOT / "README.md").read_text().splitlines()
+        if line.startswith(f"| {title},")
+    )
+    _, localized, errors, within = (cell.strip() for cell in line.strip("|").split("|"))
+    rows = [
+        row
+        for row in rows_of(ROOT / "results/benchmarks/stated_errors.csv")
+        if row["place"] == place
+    ]
+    found = [row for row in rows if row["status"] == "localized"]
+    assert numbers(localized) == [len(found), len(rows)]
+    position_m, orientation_deg = (
+        median(float(row[name]) for row in found)
+        for name in ("position_error_m", "orientation_error_deg")
+    )
+    assert numbers(errors) == pytest.approx([100 * position_m, orientation_deg], abs=0.0501)
+    inside = [
+        float(row["position_error_m"]) <= float(row["position_95_m"])
+        for row in found
+        if row["position_95_m"]
+    ]
+    unstated = [len(found) - len(inside)] if len(inside) < len(found) else []
+    assert numbers(within) == pytest.approx([100 * mean(inside), *unstated], abs=0.501)

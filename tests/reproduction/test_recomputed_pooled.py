@@ -26,8 +26,6 @@ ROOM_6K = ("large_room", "6k", "synfeal", "pretrained")
 @pytest.fixture(scope="module", params=["constructed", "published"])
 def pooled(request, tmp_path_factory):
     if request.param == "published":
-        if not (PUBLISHED / "claims.csv").is_file():
-            pytest.skip("replications are not pooled yet")
         return PUBLISHED
     root = tmp_path_factory.mktemp("replications")
     seeds = range(101, 106)
