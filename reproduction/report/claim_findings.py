@@ -134,8 +134,9 @@ def label_errors_are_small(folder: Path) -> Finding | None:
     ]
     if off.max() * FAR_MORE_EXACT > exact.position_m.min():
         return None
-    ends = [change for span in shown for change in (span.low, span.high)]
-    lowest, highest = (change_text(end) for end in (min(ends), max(ends)))
+    values = [change_text(end([span.value for span in shown])) for end in (min, max)]
+    low = change_text(min(span.low for span in shown))
+    high = change_text(max(span.high for span in shown))
     off_cm, networks_cm = _ends(100 * off), _ends(100 * exact.position_m, 0)
     texts = [f"{percent(both[0])} and {percent(both[1])}" for both in changes if both is not None]
     return Finding(
@@ -149,7 +150,7 @@ def label_errors_are_small(folder: Path) -> Finding | None:
         folder / LABEL_ERRORS,
         f"Labels that SfM and RGB-D SLAM give these renderings for training are {off_cm} cm off in"
         f" the median, the networks {networks_cm} cm; exact labels instead change the networks'"
-        f" mean errors by something between {lowest} and {highest}.",
+        f" mean errors by {' to '.join(values)} (95 % limits between {low} and {high}).",
     )
 
 

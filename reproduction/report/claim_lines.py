@@ -28,7 +28,7 @@ from reproduction.claims.tables import (
     parts_in,
     turned_percent,
 )
-from reproduction.claims.verdicts import SMALLEST, Verdict, published_claims
+from reproduction.claims.verdicts import ENOUGH, SMALLEST, Verdict, published_claims
 from reproduction.report.intervals import Interval, change_text, percent, signed
 from reproduction.tables.layouts import SOURCES, TITLES, scene_title
 from reproduction.tables.sheet import markdown_table
@@ -191,9 +191,14 @@ def _line(topic: Topic, tables: ClaimTables) -> Line | None:
         for (own, _), outcome, both in zip(tested, outcomes, changes, strict=True)
     )
     open_text = ""
-    if {*outcomes} == {UNDECIDED} and all(_is_as_claimed(*own) for both in changes for own in both):
+    every = [own for both in changes for own in both]
+    if {*outcomes} == {UNDECIDED} and all(_is_as_claimed(*own) for own in every):
         bound = ASKED_FOR[topic.asked]
-        open_text = f" All surely in the paper's direction, but not all surely by {bound}."
+        open_text = f" All surely in the paper's direction, but not all surely by {bound}"
+        if topic.asked == "direction" and all(_is_less(*own) for own in every):
+            outcomes = [f"{UNDECIDED}, and {LESS.lower()}"]
+            open_text += f"; all surely by less than {ASKED_FOR['size']}"
+        open_text += "."
     text = f"{told[0].upper()}{told[1:]}.{open_text}"
     return Line(f"{_together(outcomes)}: {topic.topic}", text)
 
@@ -218,6 +223,12 @@ def _may_be_none(both: Sequence[tuple[Interval, float]]) -> bool:
 def _is_as_claimed(span: Interval, printed: float) -> bool:
     """Tell whether limits lie on the side of no effect that the printed one is on."""
     return span.low > 1 if printed > 1 else span.high < 1
+
+
+def _is_less(span: Interval, printed: float) -> bool:
+    """Tell whether limits fall short of the share of the printed effect that replicates it."""
+    asked = math.pow(printed, ENOUGH)
+    return span.high < asked if printed > 1 else span.low > asked
 
 
 def _decided(told: Told, table: pd.DataFrame) -> list[tuple[Interval, float]]:

@@ -19,7 +19,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from reproduction.claims.tables import PERCENT, SHARE, Part, parts_in, read_claims
+from reproduction.claims.effects import BEST_NETWORK
+from reproduction.claims.tables import (
+    PERCENT,
+    SHARE,
+    Part,
+    nearest_rival,
+    parts_in,
+    read_claims,
+)
 from reproduction.claims.verdicts import Verdict, published_claims
 from reproduction.figures.style import BLUE, GREEN, VERMILION, Style
 from reproduction.report.claim_lines import OUTCOMES, part_label
@@ -32,7 +40,9 @@ COLORS = {"position": BLUE, "orientation": VERMILION}
 TICKS_PERCENT = (-80, -50, 0, 100, 300)
 ROW_INCHES = 0.29
 LEAST_ROWS = 2  # of a claim, whose title and verdict are two lines
-TICKS_BELOW = 0.27  # rows; where limits are narrow, replications would hide under the pooled value
+ASIDE = 0.27  # rows; where limits are narrow, replications would hide under the pooled value
+AS_IN_PRINT = "against the labels, as in print"
+BEST_TITLE = "PoseNet2 is the best network"
 
 
 class Forest(NamedTuple):
@@ -42,16 +52,23 @@ class Forest(NamedTuple):
         changes: Effects in percent.
         shares: Shares of batches.
         verdicts: Verdict of each claim by its id.
+        against_labels: Effects of the claims that print measures against estimated or noisy labels,
+            measured like that.
+        best_network: The network that is best in print, beside its surest rival; empty where no
+            replication compares networks.
     """
 
     changes: list[Part]
     shares: list[Part]
     verdicts: dict[str, str]
+    against_labels: list[Part]
+    best_network: list[Part]
 
     def of_claims(self, claims: Collection[str]) -> Forest:
-        """Keep the changes of some claims alone, and call verdicts as the lines on claims do."""
-        return Forest(
-            changes=[part for part in self.changes if part.claim in claims],
+        """Keep the changes of some claims and the best network; call verdicts as the lines do."""
+        kept = [part for part in self.changes if part.claim in claims]
+        return self._replace(
+            changes=[*kept, *self.best_network],
             shares=[],
             verdicts={
                 claim: OUTCOMES[Verdict(verdict)].lower()
@@ -64,7 +81,8 @@ class Forest(NamedTuple):
     def digest(self) -> str:
         """Hash of what is shown."""
         verdicts = sorted(self.verdicts.items())
-        return digest([str(part) for part in (*self.changes, *self.shares, *verdicts)])
+        parts = (*self.changes, *self.shares, *self.against_labels, *verdicts)
+        return digest([str(part) for part in parts])
 
 
 def read_forest(folder: Path) -> Forest:
@@ -77,11 +95,16 @@ def read_forest(folder: Path) -> Forest:
         InputError: A table cannot be read.
     """
     table, judged, _ = read_claims(folder)
-    parts = parts_in(table)
+    parts, against_labels = parts_in(table), parts_in(table, "labels")
+    best = nearest_rival(table, BEST_NETWORK)
     return Forest(
-        [part for part in parts if part.unit == PERCENT],
-        [part for part in parts if part.unit == SHARE],
-        {claim: verdict for (claim, against), verdict in judged.items() if against != "labels"},
+        changes=[part for part in parts if part.unit == PERCENT],
+        shares=[part for part in parts if part.unit == SHARE],
+        verdicts={
+            claim: verdict for (claim, against), verdict in judged.items() if against != "labels"
+        },
+        against_labels=[part for part in against_labels if (part.claim, "labels") in judged],
+        best_network=[best] if best else [],
     )
 
 
@@ -97,12 +120,13 @@ def forest_picture(forest: Forest) -> bytes:
 
 def forest_figure(forest: Forest) -> Figure:
     """Draw a row for each part: replications as ticks, the pooled value with limits, print."""
-    changes, shares, verdicts = forest
+    changes, shares, verdicts = forest.changes, forest.shares, forest.verdicts
     blocks = [rows for rows in (changes, shares) if rows]
     heights = [_places(rows)[1] + 1.5 for rows in blocks]
     figure = Figure(figsize=(9.5, ROW_INCHES * sum(heights) + 1.0), layout="constrained")
     above, *below = figure.subplots(len(blocks), 1, height_ratios=heights, squeeze=False)[:, 0]
     _draw_rows(above, [_as_ratios(row) for row in changes])
+    _draw_against_labels(above, changes, [_as_ratios(row) for row in forest.against_labels])
     above.set_xscale("log")
     above.axvline(1, color="0.3", lw=0.8, zorder=0)
     above.set_xticks(
@@ -151,7 +175,7 @@ def _draw_rows(axes: Axes, rows: Sequence[Part]) -> None:
     for y, row in zip(places, rows, strict=True):
         color = COLORS.get(row.quantity, GREEN)
         value, low, high = row.decided
-        below = [y + TICKS_BELOW] * len(row.single)
+        below = [y + ASIDE] * len(row.single)
         axes.plot(row.single, below, "|", color=color, ms=4.5, mew=0.9, zorder=2)
         axes.plot([low, high], [y, y], color=color, lw=2.2, solid_capstyle="butt", zorder=2)
         name = row.quantity if row.quantity in COLORS else "other"
@@ -161,21 +185,42 @@ def _draw_rows(axes: Axes, rows: Sequence[Part]) -> None:
         if math.isfinite(row.printed):
             printed: Style = {"mfc": "white", "mec": "0.25", "mew": 1.1, "ms": 5.5, "zorder": 4}
             axes.plot(row.printed, y, "D", label="the paper", **printed)
-    axes.set_yticks(places, [part_label(row) for row in rows])
+    axes.set_yticks(places, [_label(row) for row in rows])
     axes.set_ylim(end - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="x", color="0.92")
     axes.spines["left"].set_visible(False)
 
 
+def _label(row: Part) -> str:
+    label = part_label(row)
+    if row.claim == BEST_NETWORK:
+        return f"PoseNet2 instead of {label.removeprefix('than ')}"
+    return label
+
+
+def _draw_against_labels(axes: Axes, rows: Sequence[Part], as_printed: Sequence[Part]) -> None:
+    """Draw effects as print measures them, above those that are against the true poses."""
+    places = {(row.claim, row.label): y for y, row in zip(_places(rows)[0], rows, strict=True)}
+    for row in as_printed:
+        if (row.claim, row.label) in places:
+            y = places[row.claim, row.label] - ASIDE
+            color = COLORS.get(row.quantity, GREEN)
+            value, low, high = row.decided
+            axes.plot([low, high], [y, y], color=color, lw=1, solid_capstyle="butt", zorder=2)
+            hollow: Style = {"color": color, "mfc": "white", "ms": 4, "mew": 1, "zorder": 3}
+            axes.plot(value, y, "o", label=AS_IN_PRINT, **hollow)
+
+
 def _name_claims(axes: Axes, rows: Sequence[Part], verdicts: dict[str, str]) -> None:
     """Write each claim with its verdict beside its first row, and rule a line above it."""
-    titles = {claim.id: claim.title for claim in published_claims()}
+    titles = {claim.id: f"{claim.title} ({claim.id})" for claim in published_claims()}
+    titles[BEST_NETWORK] = BEST_TITLE
     before = None
     for y, row in zip(_places(rows)[0], rows, strict=True):
         if row.claim != before:
             axes.annotate(
-                f"{row.claim}: {titles[row.claim]}\n{verdicts.get(row.claim, 'not judged')}",
+                f"{titles[row.claim]}\n{verdicts.get(row.claim, 'not judged')}",
                 (1.01, y - 0.3),
                 xycoords=("axes fraction", "data"),
                 va="top",

@@ -55,7 +55,7 @@ def test_the_readme_tells_networks_of_the_papers_size_as_they_were_measured():
     small = night.set_index("method").position_m_true
     told = re.search(
         r"off by (\d+) and (\d+) cm in the Large Room; the small ones, after 30,000 images, by"
-        r" (\d+) and (\d+), and matched features by ([\d.]+) ",
+        r" (\d+) and (\d+) cm, and matched features by ([\d.]+) ",
         (REPOSITORY / "README.md").read_text(),
     )
     networks = ("posenet", "posenet2")
