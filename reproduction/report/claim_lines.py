@@ -193,12 +193,12 @@ def _line(topic: Topic, tables: ClaimTables) -> Line | None:
     open_text = ""
     every = [own for both in changes for own in both]
     if {*outcomes} == {UNDECIDED} and all(_is_as_claimed(*own) for own in every):
-        bound = ASKED_FOR[topic.asked]
-        open_text = f" All surely in the paper's direction, but not all surely by {bound}"
+        less = ""
         if topic.asked == "direction" and all(_is_less(*own) for own in every):
             outcomes = [f"{UNDECIDED}, and {LESS.lower()}"]
-            open_text += f"; all surely by less than {ASKED_FOR['size']}"
-        open_text += "."
+            less = f" and by less than {ASKED_FOR['size']}"
+        bound = ASKED_FOR[topic.asked]
+        open_text = f" All surely in the paper's direction{less}, but not all surely by {bound}."
     text = f"{told[0].upper()}{told[1:]}.{open_text}"
     return Line(f"{_together(outcomes)}: {topic.topic}", text)
 

@@ -267,17 +267,17 @@ def test_learning_curves_that_do_not_fall_leave_training_longer_unknown(tmp_path
     assert main([str(tmp_path)]) == 0  # the figure
 
 
-SURE = "All surely in the paper's direction, but not all surely by the 5 % asked for"
-LESS = "; all surely by less than two thirds of the printed size"
+SURE = "All surely in the paper's direction{}, but not all surely by the 5 % asked for."
+LESS = " and by less than two thirds of the printed size"
 
 
 # Printed are +42 % and more, two thirds of whose logarithm are +26 %.
 @pytest.mark.parametrize(
     ("low", "high", "heading", "said"),
     [
-        (2.0, 10.0, "Undecided, and smaller than printed", f"{SURE}{LESS}."),
-        (2.0, 25.0, "Undecided, and smaller than printed", f"{SURE}{LESS}."),
-        (2.0, 27.0, "Undecided", f"{SURE}."),
+        (2.0, 10.0, "Undecided, and smaller than printed", SURE.format(LESS)),
+        (2.0, 25.0, "Undecided, and smaller than printed", SURE.format(LESS)),
+        (2.0, 27.0, "Undecided", SURE.format("")),
         (-2.0, 10.0, "Undecided", ""),
     ],
 )
