@@ -233,3 +233,88 @@ def test_photographs_in_the_readme_are_those_that_were_measured(title, place):
     ]
     unstated = [len(found) - len(inside)] if len(inside) < len(found) else []
     assert numbers(within) == pytest.approx([100 * mean(inside), *unstated], abs=0.501)
+
+
+def test_sfm_models_of_the_replications_are_told_as_they_were_measured():
+    page = (ROOT / "docs/estimation.md").read_text()
+    told = page.split("### In the replications")[1].split("\nTo add a method")[0]
+    rows = [
+        {name: float(row[name]) for name in ("rmse_m", "explained")}
+        for row in rows_of(ROOT / "results/benchmarks/explained.csv")
+        if row["profile"].startswith("replication_")
+    ]
+    wrong = [row for row in rows if row["rmse_m"] > 0.2]
+    sound = [row for row in rows if row["rmse_m"] <= 0.2]
+    words = {7: "seven", 11: "eleven", 3: "three"}
+    off_m = [row["rmse_m"] for row in wrong]
+    off_cm = [100 * row["rmse_m"] for row in sound]
+    assert f"have {len(rows)} training batches" in told
+    assert f"models of {len(sound)} are off by {median(off_cm):.1f} cm in the median" in told
+    assert f"squares, {max(off_cm):.1f} cm at most" in told
+    assert f"The other {words[len(wrong)]}, {min(off_m):.1f} to {max(off_m):.1f} m off" in told
+    ranges = [
+        [round(100 * end(row["explained"] for row in some)) for end in (min, max)]
+        for some in (wrong, sound)
+    ]
+    assert (
+        "{} to {} % of the matched points, the sound ones {} to {} %".format(*ranges[0], *ranges[1])
+        in told
+    )
+    doubtful = [row for row in rows if row["explained"] < 0.85]
+    among = sum(row["rmse_m"] > 0.2 for row in doubtful)
+    assert (
+        f"Below 85 % are {words[len(doubtful)]} batches, {words[among]} of the {words[len(wrong)]}"
+        " among them" in told
+    )
+
+
+def test_rows_of_real_photographs_are_those_of_the_tables():
+    scored = {
+        (row["labels"], row["trained_on"], row["method"]): row
+        for row in rows_of(PUBLISHED / "real/tables/table8_real.csv")
+        if row["direction"] == "forward"
+    }
+    others = {
+        (row["labels"], row["method"]): row
+        for row in rows_of(ROOT / "results/benchmarks/published_poses.csv")
+    }
+    labels = {"SfM": ("sfm", "sfm", "_sfm"), "depth SLAM": ("given", "dslam", "")}
+    names = {
+        "Structure": "structure",
+        "PoseNet2": "posenet2",
+        "hloc": "hloc",
+        "Active Search": "as",
+    }
+    sources = {"renderings": "rendered", "randomised renderings": "randomised"}
+    for line in part("README.md", "real_short", "real").splitlines()[2:]:
+        told, method, source, errors, share = (cell.strip() for cell in line.strip("|").split("|"))
+        own, of_others, end = labels[told]
+        name = names[method.strip("*\\")]
+        limits = ("", "_low", "_high")
+        if source in sources:
+            row = scored[own, sources[source], name]
+            expected = [row[f"position_m{limit}{end}"] for limit in limits]
+            shares = [row[f"recall_5cm_5deg{limit}{end}"] for limit in limits]
+            degrees = row[f"orientation_deg{end}"]
+        else:
+            row = others[of_others, name]
+            expected, shares = [row["position_m"]], [row["recall_5cm_5deg"]]
+            degrees = row["orientation_deg"]
+        *position_cm, orientation_deg = numbers(re.sub("within|–", " ", errors))
+        assert position_cm == pytest.approx([100 * float(n) for n in expected], abs=0.501)
+        assert position_cm[0] == pytest.approx(100 * float(expected[0]), abs=0.0501)
+        assert orientation_deg == pytest.approx(float(degrees), abs=0.0501)
+        shown = numbers(share.replace("–", " "))
+        assert shown == pytest.approx([100 * float(n) for n in shares], abs=0.501)
+
+
+def test_sfm_models_by_other_settings_are_told_as_they_were_measured():
+    page = (ROOT / "docs/estimation.md").read_text()
+    measured = defaultdict(list)
+    for row in rows_of(ROOT / "results/benchmarks/sfm_failures.csv"):
+        cm = [100 * float(row[name]) for name in ("median_m", "max_m")]
+        measured[f"{row['seed']}, {row['batch']}"] += [round(cm[0], 1), round(cm[1])]
+    assert len(measured) == 3
+    for key, expected in measured.items():
+        (line,) = (line for line in page.splitlines() if line.startswith(f"  | {key} |"))
+        assert numbers(line.split("|", 2)[2].replace(",", " ")) == expected
