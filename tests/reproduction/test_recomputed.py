@@ -203,38 +203,6 @@ def rank_correlation(first, second):
     )
 
 
-@pytest.mark.parametrize(
-    ("title", "place"),
-    [("corridor", "corridor"), ("desk", "freiburg1_rpy"), ("kitchen", "RedKitchen")],
-)
-def test_photographs_in_the_readme_are_those_that_were_measured(title, place):
-    (line,) = (
-        line
-        for line in (ROOT / "README.md").read_text().splitlines()
-        if line.startswith(f"| {title},")
-    )
-    _, localized, errors, within = (cell.strip() for cell in line.strip("|").split("|"))
-    rows = [
-        row
-        for row in rows_of(ROOT / "results/benchmarks/stated_errors.csv")
-        if row["place"] == place
-    ]
-    found = [row for row in rows if row["status"] == "localized"]
-    assert numbers(localized) == [len(found), len(rows)]
-    position_m, orientation_deg = (
-        median(float(row[name]) for row in found)
-        for name in ("position_error_m", "orientation_error_deg")
-    )
-    assert numbers(errors) == pytest.approx([100 * position_m, orientation_deg], abs=0.0501)
-    inside = [
-        float(row["position_error_m"]) <= float(row["position_95_m"])
-        for row in found
-        if row["position_95_m"]
-    ]
-    unstated = [len(found) - len(inside)] if len(inside) < len(found) else []
-    assert numbers(within) == pytest.approx([100 * mean(inside), *unstated], abs=0.501)
-
-
 def test_sfm_models_of_the_replications_are_told_as_they_were_measured():
     page = (ROOT / "docs/estimation.md").read_text()
     told = page.split("### In the replications")[1].split("\nTo add a method")[0]
