@@ -9,7 +9,8 @@ INSTALLED := $(VENV)/installed
 SLURM_INSTALLED := $(VENV)/installed-slurm
 QUALITY := $(VENV)/quality
 DOCS := $(VENV)/docs
-SPHINX := $(BIN)/sphinx-build -c docs/site -d build/doctrees
+# Notebooks call `synfeal` by name.
+SPHINX := PATH=$(abspath $(BIN)):$$PATH $(BIN)/sphinx-build -c docs/site -d build/doctrees
 RUN := $(BIN)/synfeal run --cores $(CORES)
 # `make real`: what is scanned, where its results go, and other labels of it (docs/real.md).
 SEVEN_SCENES ?=

@@ -1,6 +1,7 @@
 """The documentation site: what its reference covers, and what its check notices."""
 
 import inspect
+import re
 import sys
 
 import pytest
@@ -107,3 +108,16 @@ def test_pages_of_what_is_gone_are_removed_and_others_left_alone(
     reference.write_pages(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a.rst"]
     assert (tmp_path / "a.rst").stat().st_mtime_ns == before
+
+
+def test_the_contents_name_pages_that_there_are():
+    """Sphinx notices, but the site is built less often than tests are run."""
+    folder = ROOT / "docs"
+    blocks = re.findall(r"```\{toctree\}(.*?)```", (folder / "index.md").read_text(), re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines() if line]
+    entries = [line for line in lines if not line.startswith(":")]
+    names = [re.sub(r".*<(.+)>", r"\1", entry) for entry in entries]
+    written = [name for name in names if not name.startswith("reference/")]
+    assert len(written) > 20
+    for name in written:
+        assert any((folder / f"{name}{end}").is_file() for end in (".md", ".ipynb")), name
