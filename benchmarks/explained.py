@@ -61,9 +61,9 @@ def main() -> None:
     parser.add_argument("--runs", nargs="+", required=True, help="their folders in RESULTS")
     args = parser.parse_args()
     config = load_config(Path("config/config.yaml"), args.config)
-    before = read_rows(args.table)
+    before = read_rows(args.table, ("profile", "scene"))
     rows = [row for run in args.runs for row in batch_rows(args.results, run, config)]
-    others = before[~before["profile"].isin(args.runs)] if len(before) else before
+    others = before[~before["profile"].isin(args.runs)]
     write_frame(args.table, pd.concat([others, pd.DataFrame(rows)]), "%.4g")
 
 

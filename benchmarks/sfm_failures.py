@@ -22,9 +22,10 @@ import pandas as pd
 import pycolmap
 from numpy.typing import NDArray
 
+from baselines.config.labels import SfmConfig
 from baselines.labels.alignment import fit
 from baselines.labels.batches import link_images, read_trajectory
-from baselines.labels.sfm.features import colmap_parameters
+from baselines.labels.sfm.features import extract_features
 from baselines.labels.sfm.mapping import camera_poses
 from benchmarks.label_batches import SIZE, SPLIT, frames_of
 from benchmarks.rows import read_rows
@@ -54,17 +55,11 @@ def map_by_defaults(
     with tempfile.TemporaryDirectory() as folder:
         images, database = Path(folder, "images"), Path(folder, "database.db")
         link_images(color, camera, images)
-        reader = pycolmap.ImageReaderOptions()
-        reader.camera_model = "PINHOLE"
-        reader.camera_params = ",".join(map(repr, colmap_parameters(camera)))
-        pycolmap.extract_features(
-            database,
-            images,
-            camera_mode=pycolmap.CameraMode.SINGLE,
-            reader_options=reader,
-            extraction_options=pycolmap.FeatureExtractionOptions(num_threads=1, use_gpu=False),
-            device=pycolmap.Device.cpu,
+        sift = pycolmap.SiftExtractionOptions()
+        cfg = SfmConfig(
+            max_features=sift.max_num_features, peak_threshold=sift.peak_threshold, few_features=0
         )
+        extract_features(images, database, camera, cfg)
         matching = pycolmap.FeatureMatchingOptions(num_threads=1, use_gpu=False)
         pycolmap.match_exhaustive(database, matching, device=pycolmap.Device.cpu)
         options = pycolmap.IncrementalPipelineOptions(

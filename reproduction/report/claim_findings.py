@@ -134,7 +134,7 @@ def label_errors_are_small(folder: Path) -> Finding | None:
     ]
     if off.max() * FAR_MORE_EXACT > exact.position_m.min():
         return None
-    values = [change_text(end([span.value for span in shown])) for end in (min, max)]
+    values = [span.value for span in shown]
     low = change_text(min(span.low for span in shown))
     high = change_text(max(span.high for span in shown))
     off_cm, networks_cm = _ends(100 * off), _ends(100 * exact.position_m, 0)
@@ -150,7 +150,8 @@ def label_errors_are_small(folder: Path) -> Finding | None:
         folder / LABEL_ERRORS,
         f"Labels that SfM and RGB-D SLAM give these renderings for training are {off_cm} cm off in"
         f" the median, the networks {networks_cm} cm; exact labels instead change the networks'"
-        f" mean errors by {' to '.join(values)} (95 % limits between {low} and {high}).",
+        f" mean errors by {change_text(min(values))} to {change_text(max(values))} (95 % limits"
+        f" between {low} and {high}).",
     )
 
 

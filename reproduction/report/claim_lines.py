@@ -356,7 +356,8 @@ def part_label(part: Part) -> str:
         return SOURCES.get(part.label, part.label)
     if part.label.startswith(RIVAL):  # of the best of all
         model, comma, cell = part.label.removeprefix(RIVAL).partition(",")
-        return f"than {TITLES[model]}{comma}{cell}"
+        than = "PoseNet2 instead of" if part.claim == BEST_NETWORK else "than"
+        return f"{than} {TITLES[model]}{comma}{cell}"
     model, comma, rest = part.label.partition(",")
     if model in TITLES:
         return f"{TITLES[model]}{comma}{rest}"

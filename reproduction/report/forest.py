@@ -185,18 +185,11 @@ def _draw_rows(axes: Axes, rows: Sequence[Part]) -> None:
         if math.isfinite(row.printed):
             printed: Style = {"mfc": "white", "mec": "0.25", "mew": 1.1, "ms": 5.5, "zorder": 4}
             axes.plot(row.printed, y, "D", label="the paper", **printed)
-    axes.set_yticks(places, [_label(row) for row in rows])
+    axes.set_yticks(places, [part_label(row) for row in rows])
     axes.set_ylim(end - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="x", color="0.92")
     axes.spines["left"].set_visible(False)
-
-
-def _label(row: Part) -> str:
-    label = part_label(row)
-    if row.claim == BEST_NETWORK:
-        return f"PoseNet2 instead of {label.removeprefix('than ')}"
-    return label
 
 
 def _draw_against_labels(axes: Axes, rows: Sequence[Part], as_printed: Sequence[Part]) -> None:

@@ -286,3 +286,12 @@ def test_sfm_models_by_other_settings_are_told_as_they_were_measured():
     for key, expected in measured.items():
         (line,) = (line for line in page.splitlines() if line.startswith(f"  | {key} |"))
         assert numbers(line.split("|", 2)[2].replace(",", " ")) == expected
+
+
+def test_what_a_shared_machine_took_is_told_as_it_was_measured():
+    page = (ROOT / "docs/cost.md").read_text()
+    (row,) = rows_of(ROOT / "results/benchmarks/reproduce_shared.csv")
+    assert f"took {float(row['run_s']) / 3600:.1f} hours" in page
+    assert f"left {row['packages_gb']} GB of packages" in page
+    assert f"{row['results_gb']} GB of results" in page
+    assert f"took {float(row['largest_job_mb']) / 1000:.1f} GB of memory" in page
